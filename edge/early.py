@@ -6,9 +6,9 @@ import logging
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
+from edge.elementary import logistic
 from edge.errors import InputError
 from edge.events import Decided
-from edge.logarithm import logistic
 from edge.model.agreement import product_label
 from edge.model.info import (
     UNKNOWN,

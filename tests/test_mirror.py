@@ -6,7 +6,6 @@ from pathlib import Path
 
 ROOT = Path(__file__).parents[1]
 THROUGH = {
-    "edge/touch/pose.py": "edge/touch/test_arm.py",
     "train/study": "train/study/test_study_report.py",
     "train/tradeoff": "train/tradeoff/test_tradeoff.py",
     "train/report/work.py": "train/study/test_study_report.py",

@@ -10,8 +10,8 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 from edge.arrays import Floats
+from edge.elementary import log, logistic
 from edge.errors import InputError
-from edge.logarithm import log, logistic
 from edge.touch.features import feature_vector, widths
 from edge.touch.layout import SkinLayout, for_device
 from edge.touch.still import WatchfulTracker

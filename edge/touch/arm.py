@@ -13,8 +13,8 @@ from numpy.typing import ArrayLike
 
 from edge.arrays import Floats
 from edge.config import ConfigTable, read_toml, short_text
+from edge.elementary import MOST_RAD, cos, length, sin
 from edge.errors import InputError, about
-from edge.touch.trigonometry import MOST, cos, length, sin
 
 Vector = tuple[float, float, float]
 ZERO: Vector = (0.0, 0.0, 0.0)
@@ -96,8 +96,8 @@ class Chain:
         after it."""
 
     def pose(self, q: ArrayLike) -> Floats:
-        """Pose of the tip in the base's frame; see `edge.touch.pose`."""
-        from edge.touch.pose import pose  # the board follows single points
+        """Pose of the tip in the base's frame; see `edge.touch.joint_angles.pose`."""
+        from edge.touch.joint_angles import pose  # the board follows single points
 
         return pose(self.names, self.carried, q)
 
@@ -116,7 +116,7 @@ class Chain:
             InputError: as `pose`.
         """
         angles = np.asarray(q).tolist()
-        if len(angles) != self.dof or not sum(map(abs, angles)) <= MOST:
+        if len(angles) != self.dof or not sum(map(abs, angles)) <= MOST_RAD:
             self.pose(q)  # raises
         x, y, z = self.carried(angles, (*position, 1.0))
         return x, y, z

@@ -12,12 +12,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from edge.arrays import Booleans, Counts, Floats, Integers
+from edge.elementary import length
 from edge.errors import InputError
 from edge.touch.active import ActiveTaxels, Region
 from edge.touch.feature import OF_PAPER, PAPER, Feature
 from edge.touch.frame import Frame
 from edge.touch.layout import SkinLayout
-from edge.touch.trigonometry import length
 
 if TYPE_CHECKING:
     from edge.touch.arm import Chain, Vector

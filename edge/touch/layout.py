@@ -11,8 +11,8 @@ import numpy as np
 
 from edge.arrays import Booleans
 from edge.config import ConfigTable
+from edge.elementary import cos, sin
 from edge.errors import InputError, about
-from edge.touch.trigonometry import cos, sin
 
 RELEASE_S = 0.3
 """Longer than an arm bounces off a rigid object, and shorter than the time to a second

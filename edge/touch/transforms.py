@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from edge.arrays import Array, Floats
-from edge.logarithm import log
+from edge.elementary import log
 from edge.touch.feature import Feature
 from edge.touch.layout import SkinLayout
 

@@ -33,8 +33,8 @@ from dataclasses import astuple, dataclass, replace
 import numpy as np
 
 from edge.arrays import Booleans, Floats, Integers
+from edge.elementary import log
 from edge.errors import InputError
-from edge.logarithm import log
 from edge.model.info import (
     NOVELTY_RATE,
     Novelty,

@@ -1,0 +1,75 @@
+"""Elementary functions of IEEE basic operations: the same bits on every machine.
+
+Each takes the argument into a small range, as in Cody and Waite (Software Manual for
+the Elementary Functions, 1980), with pi and log(2) in two parts. There it sums up
+Taylor's series; that of the logarithm is in s of log((1 + s) / (1 - s)). Sines are
+wrong by at most 7e-16, cosines by 1.4e-15, up to `MOST_RAD`; logarithms by less than
+three units in the last place. Numbers and arrays get the same bits.
+"""
+
+import math
+from collections.abc import Iterable
+from typing import Any
+
+import numpy as np
+
+MOST_RAD = 1e6
+"""An arm's joint does not turn so far."""
+PER_HALF_TURN = 0.3183098861837907
+HALF_TURN = 3.1416015625
+HALF_TURN_REST = -8.908910206761537e-6
+LN2_HIGH = 0.6931471803691238
+LN2_LOW = 1.9082149292705877e-10
+SQRT_HALF = 0.7071067811865476
+ROUNDING = 6755399441055744.0
+"""1.5 times 2^52. Added and taken off, it rounds a number to a whole one."""
+
+
+def sin(x: Any) -> Any:
+    """Sine of radians, a number or an array."""
+    turns = (x * PER_HALF_TURN + ROUNDING) - ROUNDING
+    rest = (x - turns * HALF_TURN) - turns * HALF_TURN_REST
+    square = rest * rest
+    series = 1.0
+    for n in range(22, 0, -2):
+        series = 1.0 - series * square / (n * (n + 1))
+    odd = turns - 2.0 * ((0.5 * turns + ROUNDING) - ROUNDING)
+    return rest * series * (1.0 - 2.0 * odd * odd)
+
+
+def cos(x: Any) -> Any:
+    """Cosine of radians, a number or an array."""
+    half = sin(0.5 * x)
+    return 1.0 - 2.0 * half * half
+
+
+def length(vector: Iterable[float]) -> float:
+    """Of a vector (3,) below 1e150."""
+    x, y, z = vector
+    return math.sqrt(x * x + y * y + z * z)
+
+
+def log(x: Any) -> Any:
+    """Natural logarithm of a number above 0, or of an array of them."""
+    fraction, power = np.frexp(x)
+    low = fraction < SQRT_HALF
+    power = power - low
+    f = fraction * (1.0 + low) - 1.0
+    s = f / (2.0 + f)
+    square = s * s
+    series = 0.0
+    for n in range(23, 0, -2):
+        series = series * square + 2.0 / n
+    return power * LN2_HIGH + (power * LN2_LOW + s * series)
+
+
+def logistic(x: float) -> float:
+    """1 / (1 + exp(-x)), to a relative error of 5e-16."""
+    size = min(700.0, abs(x))  # flat beyond; of NaN the first
+    power = round(size / LN2_HIGH)
+    rest = (power * LN2_HIGH - size) + power * LN2_LOW
+    series = 1.0
+    for n in range(14, 0, -1):
+        series = 1.0 + rest * series / n
+    small = math.ldexp(series, -power)
+    return (1.0 if x > 0.0 else small) / (1.0 + small)
