@@ -14,12 +14,12 @@ from train.choose.evaluate import (
     AnswerTable,
     Promise,
     Result,
-    Rule,
     averaged,
     evaluate,
     fits,
 )
 from train.choose.protocols import GroupsLeftOut, TrialsLeftOut, promised
+from train.choose.rule import Rule
 from train.choose.search import SearchGrid
 from train.choose.settings import Chosen, Settings
 from train.data.dataset import DataSet
@@ -99,15 +99,18 @@ class Choosing:
         *,
         nested: bool,
         repeated: bool = True,
+        halve: bool = True,
     ) -> tuple[AnswerTable, AnswerTable]:
         """The candidates' answers to left-out trials, and to left-out groups where
-        there are any.
+        there are any, each of the tasks that are chosen by them.
 
         Without groups, both are the answers to left-out trials.
         """
         folds = self._divisions.folds
         further_folds = self._divisions.further if repeated else ()
         grids = [grid for candidate in candidates for grid in candidate.grids]
+        alone = [task for task in self._y if not self._is_grouped(task)]
+        by_trial = for_tasks(grids, alone)
         total = fits(folds, nested)
         total += sum(fits(division, False) for division in further_folds)
         if self._groups is not None:
@@ -119,18 +122,24 @@ class Choosing:
             unit=" fits",
             disable=not self._progress,
         ) as progress:
-            answers = partial(evaluate, jobs=self._jobs, progress=progress.update)
-            trials = answers(vectors, folds, grids, nested=nested)
+            answers = partial(
+                evaluate,
+                vectors,
+                jobs=self._jobs,
+                progress=progress.update,
+                halve=halve,
+            )
+            trials = answers(folds, by_trial, nested=nested)
             further = [
-                answers(vectors, division, grids, nested=False)
-                for division in further_folds
+                answers(division, by_trial, nested=False) for division in further_folds
             ]
             trials = replace(trials, repeated=tuple(further))
             if self._groups is None:
                 return trials, trials
-            vectors = replace(vectors, y=_grouped_labels(self._groups, self._y, grids))
-            unseen = _unseen(self._groups, grids)
-            groups = answers(vectors, self._groups.folds, unseen, nested=nested)
+            unseen = for_tasks(
+                _unseen(self._groups, grids), _grouped_tasks(self._groups, self._y)
+            )
+            groups = answers(self._groups.folds, unseen, nested=nested)
         return trials, groups
 
     def _right(self, window_s: float) -> dict[str, Floats]:
@@ -200,7 +209,10 @@ class Choosing:
             by_group = {task: groups.by_fold(task) for task in groups.table.right}
             plans[groups.name] = groups.folds, _by_fold(by_group)
         together = decided_together(chosen, vectors, plans, self._jobs)
-        return Settings(together, trials.folds, without, self.candidates, window_s, [])
+        settings = Settings(
+            together, trials.folds, without, self.candidates, window_s, []
+        )
+        return settings.without_dropped()
 
     def _protocols(
         self,
@@ -249,7 +261,9 @@ class Choosing:
         dataset = self._dataset.of(features_of(candidates))
         vectors = dataset.vectors(window_s, self._samples, self._y)
         what = f"{window_s:g} s"
-        return self._tables(vectors, candidates, what, nested=False, repeated=False)
+        # A candidate counts by its mean over several windows, so none is dropped.
+        once = {"nested": False, "repeated": False, "halve": False}
+        return self._tables(vectors, candidates, what, **once)
 
     def _settle(
         self,
@@ -266,12 +280,19 @@ class Choosing:
         own_choices = [
             protocol.of_candidate(task, candidate) for candidate in self.candidates
         ]
+        accuracy = promise(protocol.accuracy(task))
+        by_trial = accuracy
+        if protocol is not trials:
+            # `decided_together` counts the answers to left-out trials.
+            total = int((trials.folds >= 0)[self._y[task] != ""].sum())
+            none_right = Result(0, total, hits=np.zeros(total, dtype=bool))
+            by_trial = promised(none_right, untouched)
         chosen = Chosen(
             choice=protocol.choice(task),
-            accuracy=promise(protocol.accuracy(task)),
-            by_trial=promised(trials.answered(task, without), untouched),
+            accuracy=accuracy,
+            by_trial=by_trial,
             left_out=protocol.name,
-            candidates=tuple(promise(result) for result, _ in own_choices),
+            candidates=tuple(result and promise(result) for result, _ in own_choices),
             picks=tuple(choice for _, choice in own_choices),
             folds=protocol.folds,
         )
@@ -289,14 +310,21 @@ def _unseen(groups: Groups, grids: Sequence[SearchGrid]) -> list[SearchGrid]:
     return unseen
 
 
-def _grouped_labels(groups: Groups, y: Labels, grids: Sequence[SearchGrid]) -> Labels:
-    """The labels that answers to left-out groups need: of all tasks where a grid has
-    targets, else of those with groups and of the tasks that agree with them."""
-    if any(grid.targets for grid in grids):
-        return y
+def _grouped_tasks(groups: Groups, y: Labels) -> list[str]:
+    """The tasks with groups, and those that agree with them."""
     together = [family for family in families(y) if groups.tasks & {*family}]
     tasks = groups.tasks.union(*together)
-    return {task: y[task] for task in y if task in tasks}
+    return [task for task in y if task in tasks]
+
+
+def for_tasks(grids: Sequence[SearchGrid], tasks: Sequence[str]) -> list[SearchGrid]:
+    """The grids that are for some of the tasks, as candidates for these alone."""
+    limited = []
+    for grid in grids:
+        served = tuple(task for task in tasks if grid.is_for(task))
+        if served:
+            limited.append(replace(grid, tasks=served))
+    return limited
 
 
 def _by_fold(choices: Mapping[str, Sequence[Choice]]) -> list[dict[str, Choice]]:
@@ -326,7 +354,11 @@ def decided_together(
     together = {}
     for task, settings in chosen.items():
         together[task] = _planned(settings, plans, (task,))
-    for family in families(vectors.y):
+    joined = families(vectors.y)
+    for task, settings in chosen.items():
+        if settings.left_out != TRIAL and not any(task in f for f in joined):
+            joined.append((task,))
+    for family in joined:
         right = {}
         for left_out in {TRIAL, *(chosen[task].left_out for task in family)}:
             right[left_out] = _right_together(family, vectors, plans[left_out], jobs)

@@ -93,17 +93,17 @@ class TrialsLeftOut:
         """The nested accuracy of the choice."""
         return nested_accuracy(self.table, task, self.rule(task))
 
-    def answered(self, task: str, by_fold: Sequence[Choice]) -> Result:
-        """The accuracy of the choice `by_fold` for each fold on the trials of it."""
-        choices = self.table.choices[task]
-        return self.table.answered(task, list(map(choices.index, by_fold)))
-
-    def of_candidate(self, task: str, candidate: Candidate) -> tuple[Result, Choice]:
-        """The nested accuracy of a candidate's own choice, and this choice."""
+    def of_candidate(
+        self, task: str, candidate: Candidate
+    ) -> tuple[Result | None, Choice]:
+        """The nested accuracy of a candidate's own choice, None where it was dropped as
+        clearly behind; and this choice."""
         choices = self.table.choices[task]
         allowed = places_of(candidate, choices)
         rule = replace(self.rule(task), allowed=allowed, margin=0.0)
         place = chosen(self.table, task, rule)
+        if not self.table.is_running(task, place):
+            return None, choices[place]
         return nested_accuracy(self.table, task, rule), choices[place]
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -26,7 +26,7 @@ class Chosen:
         by_trial: the same with single trials left out.
         left_out: `trial`, or the label whose groups were left out.
         candidates: nested accuracy of each candidate's own choice of numbers, by the
-            task alone.
+            task alone; None where it was dropped as clearly behind.
         picks: the best settings of each candidate.
         folds: (n,) of `accuracy`.
         by_fold: [fold]{task: the choice without the fold's trials}, whose decisions
@@ -38,7 +38,7 @@ class Chosen:
     accuracy: Promise
     by_trial: Promise
     left_out: str
-    candidates: tuple[Promise, ...] = ()
+    candidates: tuple[Promise | None, ...] = ()
     picks: tuple[Choice, ...] = ()
     folds: Integers = field(default_factory=lambda: np.zeros(0, np.int64), repr=False)
     by_fold: tuple[dict[str, Choice], ...] = ()
@@ -76,6 +76,23 @@ class Settings:
     def tested(self) -> int:
         """Number of trials that calibrate."""
         return int((self.folds >= 0).sum())
+
+    def without_dropped(self) -> Settings:
+        """The same without the candidates that were dropped for every task."""
+        candidates = []
+        kept: list[int] = []
+        for place, candidate in enumerate(self.candidates):
+            if any(chosen.candidates[place] for chosen in self.chosen.values()):
+                candidates.append(candidate)
+                kept.append(place)
+        chosen = {}
+        for task, settings in self.chosen.items():
+            chosen[task] = replace(
+                settings,
+                candidates=tuple(settings.candidates[place] for place in kept),
+                picks=tuple(settings.picks[place] for place in kept),
+            )
+        return replace(self, chosen=chosen, candidates=candidates)
 
     def features(self, *, folds: bool = False) -> set[str]:
         """The names of the features that the settings take.

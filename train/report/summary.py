@@ -86,7 +86,9 @@ def candidates(fitted: Fitted, prices: Prices) -> Table:
             choice = chosen.choice
             star = "*" if (choice.features, choice.projection) in pairs else " "
             result = chosen.candidates[i]
-            row[task] = f"{result.accuracy:.1%} ({interval(result)}){star}"
+            row[task] = "behind "
+            if result is not None:
+                row[task] = f"{result.accuracy:.1%} ({interval(result)}){star}"
         us, kilobytes = prices[i]
         row["us per decision"] = round(us, 1)
         row["kB"] = round(kilobytes, 1)
