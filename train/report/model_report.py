@@ -15,7 +15,7 @@ from edge.arrays import Integers
 from edge.model.model import Model
 from edge.tools.explanation import Explanation, Space, explain
 from train.choose.evaluate import Result
-from train.data.folds import stratified_folds
+from train.data.folds import finest, stratified_folds
 from train.data.labels import NO_CONTACT
 from train.data.vectors import Strings, Vectors
 from train.draw.explanation import MOST_NEAR, Case, draw_case
@@ -79,35 +79,56 @@ class Exported:
 
 def _left_out(
     vectors: Vectors,
-    task: str,
+    tasks: Sequence[str],
     choices: Choices,
     test: Integers,
-) -> tuple[list[Strings], dict[int, Explanation]]:
-    """[quarter] (test,) answers to left-out trials, and explanations as `Answers` has
-    them.
+) -> dict[str, tuple[list[Strings], dict[int, Explanation]]]:
+    """{task: [quarter] (test,) answers to left-out trials, and explanations as `Answers`
+    has them}.
 
     Args:
         vectors: (n, p) of all trials.
-        task: the task to answer.
+        tasks: those to answer, with the same settings left out.
         choices: each task's settings, chosen without the left-out trials.
         test: the left-out trials.
     """
-    labels = vectors.y[task]
-    classes, index = np.unique(labels, return_inverse=True)
-    counting = labels != ""
+    labels = vectors.y[finest({task: vectors.y[task] for task in tasks})]
+    counting = np.any([vectors.y[task] != "" for task in tasks], axis=0)
     counting[test] = False
     training = np.flatnonzero(counting)
     quarter_of = stratified_folds(labels[training], QUARTERS)
-    X = vectors.X[test]
-    answers = []
+    answers: dict[str, list[Strings]] = {task: [] for task in tasks}
     for quarter in range(QUARTERS):
         train = training[quarter_of <= quarter]
         fewer = vectors.part(train)
-        possible = fittable(choices, fewer.y)
-        model = ContactClassifier.of(possible, fewer)
-        answers.append(model.tasks_[task].classes[model.decide(X)[task].labels])
-    _, voters = model.tasks_[task].neighbours(X)
-    space = _space(model.tasks_[task], index[train])
+        model = ContactClassifier.of(fittable(choices, fewer.y), fewer)
+        for task, decided in model.decide(vectors.X[test]).items():
+            if task in answers:
+                answers[task].append(model.tasks_[task].classes[decided.labels])
+    explained = {}
+    for task, by_quarter in answers.items():
+        fitted = model.tasks_[task]
+        explained[task] = _explained(fitted, vectors, task, train, test, by_quarter[-1])
+    return {task: (answers[task], explained[task]) for task in tasks}
+
+
+def _explained(
+    fitted: FittedTask,
+    vectors: Vectors,
+    task: str,
+    train: Integers,
+    test: Integers,
+    answers: Strings,
+) -> dict[int, Explanation]:
+    """{trial: explanation} of the wrong answers (test,) to left-out trials, and of some
+    others, by a fit on the trials `train`."""
+    labels = vectors.y[task]
+    classes, index = np.unique(labels, return_inverse=True)
+    X = vectors.X[test]
+    _, voters = fitted.neighbours(X)
+    voters = fitted.space.members.searchsorted(voters)
+    train = train[fitted.space.members]
+    space = _space(fitted, index[train])
     form = vectors.features, vectors.columns
 
     def numbered(neighbour: Any) -> Any:
@@ -115,16 +136,15 @@ def _left_out(
         return neighbour and neighbour._replace(row=int(train[neighbour.row]))
 
     explained = {}
-    for place, (trial, answer) in enumerate(
-        zip(test.tolist(), answers[-1], strict=True)
-    ):
-        if answer != labels[trial] or trial % max(len(labels) // EXPLAINED, 1) == 0:
+    for place, (trial, answer) in enumerate(zip(test.tolist(), answers, strict=True)):
+        is_sample = trial % max(len(labels) // EXPLAINED, 1) == 0
+        if labels[trial] and (is_sample or answer != labels[trial]):
             label = int(np.searchsorted(classes, answer))
             truth = int(index[trial])
             why = explain(space, X[place], voters[place].tolist(), label, *form, truth)
             voted = tuple(map(numbered, why.voters))
             explained[trial] = why._replace(voters=voted, rival=numbered(why.rival))
-    return answers, explained
+    return explained
 
 
 def _space(fitted: FittedTask, labels: Integers) -> Space:
@@ -152,22 +172,31 @@ def answers_of(fitted: Fitted, jobs: int = 1) -> dict[str, Answers]:
             choices += by_task.values()
     _, vectors = fitted.selection(choices)
     answers = {}
-    cases = []
+    tested = {}
+    together: dict[tuple[str, ...], list[str]] = {}
     for task, chosen in fitted.chosen.items():
         labels = vectors.y[task]
-        tested = (chosen.folds >= 0) & (labels != "")
-        truth = np.where(tested, labels, "")
+        tested[task] = (chosen.folds >= 0) & (labels != "")
+        truth = np.where(tested[task], labels, "")
         classes = np.unique(labels).tolist()
         answers[task] = Answers(classes, truth, np.tile(truth, (QUARTERS, 1)), {})
+        # Tasks that are decided together have the same fits.
+        joined = chosen.left_out, *sorted(chosen.by_fold[0])
+        together.setdefault(joined, []).append(task)
+    cases = []
+    for tasks in together.values():
+        chosen = fitted.chosen[tasks[0]]
         for fold, by_task in enumerate(chosen.by_fold):
-            test = np.flatnonzero(tested & (chosen.folds == fold))
+            of_any = np.any([tested[task] for task in tasks], axis=0)
+            test = np.flatnonzero(of_any & (chosen.folds == fold))
             if test.size:
-                cases.append((task, by_task, test))
+                cases.append((tasks, by_task, test))
     left_out = partial(_left_out, vectors)
     results = Workers(jobs, progress=False).map("report", left_out, cases)
-    for (task, _, test), (answered, explained) in zip(cases, results, strict=True):
-        answers[task].answers[:, test] = answered
-        answers[task].explained.update(explained)
+    for (_, _, test), by_task in zip(cases, results, strict=True):
+        for task, (answered, explained) in by_task.items():
+            answers[task].answers[:, test] = np.where(tested[task][test], answered, "")
+            answers[task].explained.update(explained)
     return answers
 
 
