@@ -109,6 +109,7 @@ class Choosing:
         folds = self._divisions.folds
         further_folds = self._divisions.further if repeated else ()
         grids = [grid for candidate in candidates for grid in candidate.grids]
+        carried_over = [grid for c in candidates if not c.known for grid in c.grids]
         alone = [task for task in self._y if not self._is_grouped(task)]
         by_trial = for_tasks(grids, alone)
         total = fits(folds, nested)
@@ -137,7 +138,8 @@ class Choosing:
             if self._groups is None:
                 return trials, trials
             unseen = for_tasks(
-                _unseen(self._groups, grids), _grouped_tasks(self._groups, self._y)
+                _unseen(self._groups, carried_over),
+                _grouped_tasks(self._groups, self._y),
             )
             groups = answers(self._groups.folds, unseen, nested=nested)
         return trials, groups
@@ -292,8 +294,8 @@ class Choosing:
             accuracy=accuracy,
             by_trial=by_trial,
             left_out=protocol.name,
-            candidates=tuple(result and promise(result) for result, _ in own_choices),
-            picks=tuple(choice for _, choice in own_choices),
+            candidates=tuple(own and promise(own[0]) for own in own_choices),
+            picks=tuple(own and own[1] for own in own_choices),
             folds=protocol.folds,
         )
         return chosen, without

@@ -95,15 +95,15 @@ class TrialsLeftOut:
 
     def of_candidate(
         self, task: str, candidate: Candidate
-    ) -> tuple[Result | None, Choice]:
-        """The nested accuracy of a candidate's own choice, None where it was dropped as
-        clearly behind; and this choice."""
+    ) -> tuple[Result, Choice] | None:
+        """The nested accuracy of a candidate's own choice, and this choice; None where
+        it was dropped, or is none for the task."""
         choices = self.table.choices[task]
         allowed = places_of(candidate, choices)
+        if not any(self.table.is_running(task, place) for place in allowed):
+            return None
         rule = replace(self.rule(task), allowed=allowed, margin=0.0)
         place = chosen(self.table, task, rule)
-        if not self.table.is_running(task, place):
-            return None, choices[place]
         return nested_accuracy(self.table, task, rule), choices[place]
 
 
