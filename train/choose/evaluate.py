@@ -28,8 +28,8 @@ from numpy.typing import NDArray
 from edge.arrays import Booleans, Floats, Integers
 from edge.errors import InputError
 from edge.statistics import wilson
+from train.choose.answers import answers_without
 from train.choose.candidates import costs
-from train.choose.crossval import votes_right
 from train.choose.halving import (
     Pair,
     choices_of,
@@ -38,11 +38,10 @@ from train.choose.halving import (
     rungs,
 )
 from train.choose.rule import MOST_ACCURATE, Rule
-from train.choose.search import Decomposition, SearchGrid
+from train.choose.search import SearchGrid
 from train.data.vectors import Strings, Vectors
 from train.model.pipeline import Choice
-from train.model.scaling import centred_and_scaled, finite
-from train.threads import single_thread
+from train.model.scaling import finite
 
 VARIANCE = 2.5
 """Variance of the nested accuracy around the exported model's accuracy on other trials,
@@ -101,92 +100,6 @@ class Promise(Result):
     def interval(self) -> tuple[float, float]:
         """95 % interval: Wilson's for `variance` times fewer trials."""
         return wilson(self.right / self.variance, self.total / self.variance)
-
-
-@dataclass(frozen=True)
-class _Fit:
-    """Trials that candidates are fitted on, and those that they answer.
-
-    Attributes:
-        vectors: of all trials.
-        classes: {task: (n,) class indices, -1 for a trial without a label}.
-        train, test: the trials.
-    """
-
-    vectors: Vectors
-    classes: Mapping[str, Integers]
-    train: Integers
-    test: Integers
-
-    def labelled(self, grid: SearchGrid) -> list[tuple[list[str], Integers]]:
-        """A grid's tasks, by the `train` trials that have labels for them."""
-        by_trials: dict[bytes, tuple[list[str], Integers]] = {}
-        for task, labels in self.classes.items():
-            if grid.is_for(task):
-                trials = self.train[labels[self.train] >= 0]
-                tasks, _ = by_trials.setdefault(trials.tobytes(), ([], trials))
-                tasks.append(task)
-        return list(by_trials.values())
-
-    def decomposition(self, grid: SearchGrid, rows: Integers) -> Decomposition:
-        """The scaled vectors of a grid's features, fitted on some trials."""
-        vectors = self.vectors.of(grid.features)
-        mean, gain, scaled = centred_and_scaled(
-            vectors.X[rows],
-            grid.scaling,
-            vectors.features,
-            vectors.columns,
-        )
-        labels_of = {task: labels[rows] for task, labels in self.classes.items()}
-        new = (vectors.X[self.test] - mean) * gain
-        return Decomposition(scaled, new, labels_of)
-
-    def right(
-        self,
-        task: str,
-        grid: SearchGrid,
-        neighbours: Integers,
-        members: Integers,
-    ) -> Booleans:
-        """(candidates, test) whether a grid's candidates are right, by the neighbours
-        among some of the trials."""
-        labels = self.classes[task]
-        right = votes_right(neighbours, labels[members], labels[self.test])
-        places = [min(k, right.shape[-1]) - 1 for k in grid.neighbours]
-        # One row for each candidate: for each projection, each k.
-        rows = right[..., places].transpose(0, 2, 1)
-        return np.asarray(rows.reshape(-1, len(self.test)))
-
-
-def _answers(
-    vectors: Vectors,
-    classes: Mapping[str, Integers],
-    left_out: Booleans,
-    grids: Sequence[SearchGrid],
-) -> dict[str, Booleans]:
-    """{task: (candidates, test) whether each candidate is right} of the fit without
-    some trials, by a mask (n,), which answers these."""
-    fit = _Fit(vectors, classes, np.flatnonzero(~left_out), np.flatnonzero(left_out))
-    answers: dict[str, list[Booleans]] = {}
-    decomposed = None
-    with single_thread():
-        for grid in grids:
-            for tasks, members in fit.labelled(grid):
-                # Neighbouring grids often differ in the projection alone.
-                scaled = grid.scaling, grid.features, members.tobytes()
-                if decomposed != scaled:
-                    decomposed = scaled
-                    decomposition = fit.decomposition(grid, members)
-                neighbours = None
-                for task in tasks:
-                    if neighbours is None or (
-                        grid.projection == "lda" and not grid.targets
-                    ):
-                        neighbours = decomposition.neighbours(grid, task)
-                    answers.setdefault(task, []).append(
-                        fit.right(task, grid, neighbours, members)
-                    )
-    return {task: np.concatenate(right) for task, right in answers.items()}
 
 
 @dataclass(frozen=True)
@@ -271,13 +184,13 @@ class AnswerTable:
         shares = self._alone(task).astype(np.float64) * self._running(task)[-1]
         for table in self.repeated:
             shares += table.plain(task)
-        return shares / (1 + len(self.repeated))
+        return np.asarray(shares / (1 + len(self.repeated)))
 
     def nested(self, task: str, fold: int) -> NDArray[Any]:
         """(candidates, others) answers to the trials outside a fold, by the fits
         without the fold and without the trial's own."""
         right = self.right[task][fold][:, self.folds != fold]
-        return np.asarray(right & self._running(task)[fold])
+        return np.asarray(right * self._running(task)[fold])
 
     def is_running(self, task: str, candidate: int) -> bool:
         """Whether a candidate was not dropped, from the choice by all trials nor from
@@ -390,7 +303,7 @@ def evaluate(
     steps = rungs(count, nested) if halve else [(count, fold_pairs(count, nested))]
     for reach, pairs in steps:
         work = (
-            delayed(_answers)(
+            delayed(answers_without)(
                 vectors, classes, np.isin(folds, pair), _fitted(table, pair, grids)
             )
             for pair in pairs

@@ -15,12 +15,12 @@ from train.choose.evaluate import (
     AnswerTable,
     Promise,
     Result,
-    Rule,
     chosen,
     chosen_by_fold,
     chosen_by_other_fold,
     nested_accuracy,
 )
+from train.choose.rule import Rule
 from train.data.groups import TRIAL, Groups
 from train.data.labels import NO_CONTACT
 from train.data.vectors import Strings

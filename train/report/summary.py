@@ -53,7 +53,7 @@ def summary(fitted: Fitted, prices: Prices) -> str:
     if any(map(moves, map(measures.feature, fitted.dataset.names))):
         frame = "along the skin" if fitted.dataset.chain is None else "in the world"
         lines.append(f"contact motion is measured {frame}")
-    return "\n".join([*lines, *fitted.notes, *warnings(fitted)])
+    return "\n".join([*lines, *warnings(fitted), *fitted.notes])
 
 
 def _aligned(table: Table) -> list[str]:
