@@ -180,22 +180,23 @@ def candidates(
     only what carries over to other skins and arms is tried.
     """
     mode = Mode.drawn(joints) if drawn else Mode.usual(joints, shear, quick)
-    full = mode.full if fixed.features is None else [tuple(fixed.features)]
-    early = [] if fixed.asks else mode.early
+    mode = mode.asked(fixed)
     projections = KINDS if fixed.projection is None else (fixed.projection,)
+    every = dict.fromkeys((*mode.full, *mode.early, *mode.known))
     combinations = []
-    for sets, kind in product(dict.fromkeys((*full, *early)), projections):
+    for sets, kind in product(every, projections):
         if fixed.asks or mode.tries(kind, sets):
             grid = _grid(sets, kind, fixed, mode)
             grids = _scaled(_with_targets(grid, y, mode), sets, fixed)
-            candidate = Candidate(sets, kind, grids, sets in full, sets in early)
-            combinations.append(candidate)
-    for sets in [] if fixed.asks else mode.known:
-        if sets not in full:
-            grids = _scaled(
-                _with_targets(_grid(sets, "lda", fixed, mode), y, mode), sets, fixed
+            candidate = Candidate(
+                sets,
+                kind,
+                grids,
+                full=sets in (*mode.full, *mode.known),
+                early=sets in mode.early,
+                known=sets not in (*mode.full, *mode.early),
             )
-            combinations.append(Candidate(sets, "lda", grids, known=True))
+            combinations.append(candidate)
     return combinations
 
 
@@ -256,6 +257,13 @@ class Mode:
             together=True,
         )
 
+    def asked(self, fixed: Fixed) -> Mode:
+        """The same mode, with the features that are asked for in place of others."""
+        if not fixed.asks:
+            return self
+        full = self.full if fixed.features is None else [tuple(fixed.features)]
+        return replace(self, full=full, early=[], known=[])
+
     def tries(self, kind: str, sets: Sequence[str]) -> bool:
         """Whether a projection of some feature sets is tried by default.
 
@@ -266,7 +274,7 @@ class Mode:
         """
         if sets == ("paper",):
             return kind == "pca"
-        return kind == "lda" or self.components_alone
+        return kind == "lda" or (self.components_alone and sets in self.full)
 
 
 def _beside_every_other(joints: bool, shear: bool) -> list[tuple[str, ...]]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 
@@ -111,10 +111,8 @@ class Choosing:
         """
         folds = self._divisions.folds
         further_folds = self._divisions.further if repeated else ()
-        grids = [grid for candidate in candidates for grid in candidate.grids]
-        carried_over = [grid for c in candidates if not c.known for grid in c.grids]
-        alone = [task for task in self._y if not self._is_grouped(task)]
-        by_trial = for_tasks(grids, alone)
+        grouped = [task for task in self._y if self._is_grouped(task)]
+        by_trial = for_tasks(candidates, {*self._y}.difference(grouped))
         total = fits(folds, nested)
         total += sum(fits(division, False) for division in further_folds)
         if self._groups is not None:
@@ -140,10 +138,9 @@ class Choosing:
             trials = replace(trials, repeated=tuple(further))
             if self._groups is None:
                 return trials, trials
-            unseen = for_tasks(
-                _unseen(self._groups, carried_over),
-                _grouped_tasks(self._groups, self._y),
-            )
+            carried_over = [c for c in candidates if not c.known]
+            grouped_tasks = _grouped_tasks(self._groups, self._y)
+            unseen = _unseen(self._groups, for_tasks(carried_over, grouped_tasks))
             groups = answers(self._groups.folds, unseen, nested=nested)
         return trials, groups
 
@@ -228,10 +225,7 @@ class Choosing:
             by_group = {task: groups.by_fold(task) for task in groups.table.right}
             plans[groups.name] = groups.folds, _by_fold(by_group)
         together = decided_together(chosen, vectors, plans, self._jobs)
-        settings = Settings(
-            together, trials.folds, without, self.candidates, window_s, []
-        )
-        return settings.without_dropped()
+        return Settings(together, trials.folds, without, self.candidates, window_s, [])
 
     def _protocols(
         self,
@@ -329,20 +323,22 @@ def _unseen(groups: Groups, grids: Sequence[SearchGrid]) -> list[SearchGrid]:
     return unseen
 
 
-def _grouped_tasks(groups: Groups, y: Labels) -> list[str]:
+def _grouped_tasks(groups: Groups, y: Labels) -> frozenset[str]:
     """The tasks with groups, and those that agree with them."""
     together = [family for family in families(y) if groups.tasks & {*family}]
-    tasks = groups.tasks.union(*together)
-    return [task for task in y if task in tasks]
+    return groups.tasks.union(*together)
 
 
-def for_tasks(grids: Sequence[SearchGrid], tasks: Sequence[str]) -> list[SearchGrid]:
+def for_tasks(
+    candidates: Sequence[Candidate], tasks: Collection[str]
+) -> list[SearchGrid]:
     """The grids that are for some of the tasks, as candidates for these alone."""
     limited = []
-    for grid in grids:
-        served = tuple(task for task in tasks if grid.is_for(task))
-        if served:
-            limited.append(replace(grid, tasks=served))
+    for candidate in candidates:
+        for grid in candidate.grids:
+            served = tuple(task for task in sorted(tasks) if grid.is_for(task))
+            if served:
+                limited.append(replace(grid, tasks=served))
     return limited
 
 

@@ -300,8 +300,9 @@ def evaluate(
     vectors = replace(vectors, X=finite(vectors.X))
     classes = {task: _classes(labels) for task, labels in vectors.y.items()}
     table = _empty(folds, grids, classes)
+    widths = dict(zip(vectors.features, vectors.columns, strict=True))
     steps = rungs(count, nested) if halve else [(count, fold_pairs(count, nested))]
-    for reach, pairs in steps:
+    for step, (reach, pairs) in enumerate(steps, 1):
         work = (
             delayed(answers_without)(
                 vectors, classes, np.isin(folds, pair), _fitted(table, pair, grids)
@@ -313,8 +314,8 @@ def evaluate(
             if progress is not None:
                 progress()
             table.enter(pair, answers)
-        if halve:
-            table.drop(reach, dict(zip(vectors.features, vectors.columns, strict=True)))
+        if step < len(steps):
+            table.drop(reach, widths)
     return table
 
 

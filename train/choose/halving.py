@@ -30,7 +30,9 @@ def rungs(count: int, nested: bool) -> list[tuple[int, list[Pair]]]:
     """How far the folds of the first fits are, and these fits; and so on."""
     pairs = fold_pairs(count, nested)
     steps = []
-    for reach in (*REACHES, count):
+    # A step that leaves a single fold for the next one saves nothing.
+    reaches = [reach for reach in REACHES if 2 * reach + 1 < count]
+    for reach in (*reaches, count):
         near = [
             pair
             for pair in pairs

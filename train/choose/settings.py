@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -76,23 +76,6 @@ class Settings:
     def tested(self) -> int:
         """Number of trials that calibrate."""
         return int((self.folds >= 0).sum())
-
-    def without_dropped(self) -> Settings:
-        """The same without the candidates that were dropped for every task."""
-        candidates = []
-        kept: list[int] = []
-        for place, candidate in enumerate(self.candidates):
-            if any(chosen.candidates[place] for chosen in self.chosen.values()):
-                candidates.append(candidate)
-                kept.append(place)
-        chosen = {}
-        for task, settings in self.chosen.items():
-            chosen[task] = replace(
-                settings,
-                candidates=tuple(settings.candidates[place] for place in kept),
-                picks=tuple(settings.picks[place] for place in kept),
-            )
-        return replace(self, chosen=chosen, candidates=candidates)
 
     def features(self, *, folds: bool = False) -> set[str]:
         """The names of the features that the settings take.

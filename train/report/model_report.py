@@ -24,6 +24,7 @@ from train.model.pipeline import (
     Choice,
     Choices,
     ContactClassifier,
+    Fits,
     FittedTask,
     fittable,
 )
@@ -77,58 +78,59 @@ class Exported:
     prices: Prices
 
 
+Shared = dict[bytes, Fits]
+"""{numbers of training trials: fits on them}."""
+
+
+def _without_fold(
+    vectors: Vectors,
+    choices: Choices,
+    tests: Mapping[str, Integers],
+) -> dict[str, tuple[list[Strings], dict[int, Explanation]]]:
+    """{task: the results of `_left_out`} of tasks with the same settings, which share
+    their fits, from {task: its left-out trials}."""
+    shared: Shared = {}
+    return {
+        task: _left_out(vectors, task, choices, test, shared)
+        for task, test in tests.items()
+    }
+
+
 def _left_out(
     vectors: Vectors,
-    tasks: Sequence[str],
+    task: str,
     choices: Choices,
     test: Integers,
-) -> dict[str, tuple[list[Strings], dict[int, Explanation]]]:
-    """{task: [quarter] (test,) answers to left-out trials, and explanations as `Answers`
-    has them}.
+    shared: Shared,
+) -> tuple[list[Strings], dict[int, Explanation]]:
+    """[quarter] (test,) answers to left-out trials, and explanations as `Answers` has
+    them.
 
     Args:
         vectors: (n, p) of all trials.
-        tasks: those to answer, with the same settings left out.
+        task: the task to answer.
         choices: each task's settings, chosen without the left-out trials.
         test: the left-out trials.
+        shared: fits that are taken, and added to.
     """
-    labels = vectors.y[finest({task: vectors.y[task] for task in tasks})]
-    counting = np.any([vectors.y[task] != "" for task in tasks], axis=0)
+    labels = vectors.y[task]
+    classes, index = np.unique(labels, return_inverse=True)
+    counting = labels != ""
     counting[test] = False
     training = np.flatnonzero(counting)
-    quarter_of = stratified_folds(labels[training], QUARTERS)
-    answers: dict[str, list[Strings]] = {task: [] for task in tasks}
+    strata = vectors.y[finest({of: vectors.y[of] for of in choices})]
+    quarter_of = stratified_folds(strata[training], QUARTERS)
+    X = vectors.X[test]
+    answers = []
     for quarter in range(QUARTERS):
         train = training[quarter_of <= quarter]
         fewer = vectors.part(train)
-        model = ContactClassifier.of(fittable(choices, fewer.y), fewer)
-        for task, decided in model.decide(vectors.X[test]).items():
-            if task in answers:
-                answers[task].append(model.tasks_[task].classes[decided.labels])
-    explained = {}
-    for task, by_quarter in answers.items():
-        fitted = model.tasks_[task]
-        explained[task] = _explained(fitted, vectors, task, train, test, by_quarter[-1])
-    return {task: (answers[task], explained[task]) for task in tasks}
-
-
-def _explained(
-    fitted: FittedTask,
-    vectors: Vectors,
-    task: str,
-    train: Integers,
-    test: Integers,
-    answers: Strings,
-) -> dict[int, Explanation]:
-    """{trial: explanation} of the wrong answers (test,) to left-out trials, and of some
-    others, by a fit on the trials `train`."""
-    labels = vectors.y[task]
-    classes, index = np.unique(labels, return_inverse=True)
-    X = vectors.X[test]
-    _, voters = fitted.neighbours(X)
-    voters = fitted.space.members.searchsorted(voters)
-    train = train[fitted.space.members]
-    space = _space(fitted, index[train])
+        possible = fittable(choices, fewer.y)
+        fits = shared.setdefault(train.tobytes(), {})
+        model = ContactClassifier.of(possible, fewer, fits)
+        answers.append(model.tasks_[task].classes[model.decide(X)[task].labels])
+    _, voters = model.tasks_[task].neighbours(X)
+    space = _space(model.tasks_[task], index[train])
     form = vectors.features, vectors.columns
 
     def numbered(neighbour: Any) -> Any:
@@ -136,15 +138,16 @@ def _explained(
         return neighbour and neighbour._replace(row=int(train[neighbour.row]))
 
     explained = {}
-    for place, (trial, answer) in enumerate(zip(test.tolist(), answers, strict=True)):
-        is_sample = trial % max(len(labels) // EXPLAINED, 1) == 0
-        if labels[trial] and (is_sample or answer != labels[trial]):
+    for place, (trial, answer) in enumerate(
+        zip(test.tolist(), answers[-1], strict=True)
+    ):
+        if answer != labels[trial] or trial % max(len(labels) // EXPLAINED, 1) == 0:
             label = int(np.searchsorted(classes, answer))
             truth = int(index[trial])
             why = explain(space, X[place], voters[place].tolist(), label, *form, truth)
             voted = tuple(map(numbered, why.voters))
             explained[trial] = why._replace(voters=voted, rival=numbered(why.rival))
-    return explained
+    return answers, explained
 
 
 def _space(fitted: FittedTask, labels: Integers) -> Space:
@@ -172,30 +175,24 @@ def answers_of(fitted: Fitted, jobs: int = 1) -> dict[str, Answers]:
             choices += by_task.values()
     _, vectors = fitted.selection(choices)
     answers = {}
-    tested = {}
-    together: dict[tuple[str, ...], list[str]] = {}
+    cases: dict[tuple[object, ...], tuple[Choices, dict[str, Integers]]] = {}
     for task, chosen in fitted.chosen.items():
         labels = vectors.y[task]
-        tested[task] = (chosen.folds >= 0) & (labels != "")
-        truth = np.where(tested[task], labels, "")
+        tested = (chosen.folds >= 0) & (labels != "")
+        truth = np.where(tested, labels, "")
         classes = np.unique(labels).tolist()
         answers[task] = Answers(classes, truth, np.tile(truth, (QUARTERS, 1)), {})
-        # Tasks that are decided together have the same fits.
-        joined = chosen.left_out, *sorted(chosen.by_fold[0])
-        together.setdefault(joined, []).append(task)
-    cases = []
-    for tasks in together.values():
-        chosen = fitted.chosen[tasks[0]]
         for fold, by_task in enumerate(chosen.by_fold):
-            of_any = np.any([tested[task] for task in tasks], axis=0)
-            test = np.flatnonzero(of_any & (chosen.folds == fold))
+            test = np.flatnonzero(tested & (chosen.folds == fold))
             if test.size:
-                cases.append((tasks, by_task, test))
-    left_out = partial(_left_out, vectors)
-    results = Workers(jobs, progress=False).map("report", left_out, cases)
-    for (_, _, test), by_task in zip(cases, results, strict=True):
+                key = (chosen.left_out, fold, *by_task)
+                cases.setdefault(key, (by_task, {}))[1][task] = test
+    without_fold = partial(_without_fold, vectors)
+    of_cases = list(cases.values())
+    results = Workers(jobs, progress=False).map("report", without_fold, of_cases)
+    for (_, tests), by_task in zip(of_cases, results, strict=True):
         for task, (answered, explained) in by_task.items():
-            answers[task].answers[:, test] = np.where(tested[task][test], answered, "")
+            answers[task].answers[:, tests[task]] = answered
             answers[task].explained.update(explained)
     return answers
 

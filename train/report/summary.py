@@ -40,7 +40,8 @@ def summary(fitted: Fitted, prices: Prices) -> str:
     text."""
     lines = [
         *_aligned(candidates(fitted, prices)),
-        "* chosen; in brackets, the 95 % interval of the accuracy on other trials",
+        "* chosen; in brackets, the 95 % interval of the accuracy on other trials; "
+        "- dropped after a few folds, as behind or no better than a cheaper one",
         "",
     ]
     for task, chosen in fitted.chosen.items():
@@ -76,17 +77,19 @@ def _by_unit(units: Mapping[str, str]) -> list[str]:
 
 
 def candidates(fitted: Fitted, prices: Prices) -> Table:
-    """A row for each candidate, with the nested accuracy of its own settings and its
-    price."""
+    """A row for each candidate that was not dropped, with the nested accuracy of its
+    own settings and its price."""
     rows: list[Row] = []
     for i, candidate in enumerate(fitted.candidates):
         pairs = {(grid.features, grid.projection) for grid in candidate.grids}
+        if not any(chosen.candidates[i] for chosen in fitted.chosen.values()):
+            continue
         row: Row = {"features": candidate.name, "projection": candidate.projection}
         for task, chosen in fitted.chosen.items():
             choice = chosen.choice
             star = "*" if (choice.features, choice.projection) in pairs else " "
             result = chosen.candidates[i]
-            row[task] = "behind "
+            row[task] = "- "
             if result is not None:
                 row[task] = f"{result.accuracy:.1%} ({interval(result)}){star}"
         us, kilobytes = prices[i]
