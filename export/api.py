@@ -157,7 +157,10 @@ def measure(fitted: Fitted) -> list[tuple[float, float]]:
 
 
 def _measured(fitted: Fitted, candidate: int) -> tuple[float, float]:
-    choices = {task: chosen.picks[candidate] for task, chosen in fitted.chosen.items()}
+    picks = {task: chosen.picks[candidate] for task, chosen in fitted.chosen.items()}
+    choices = {task: choice for task, choice in picks.items() if choice is not None}
+    if not choices:
+        return 0.0, 0.0
     dataset, vectors = fitted.selection(choices.values())
     classifier = ContactClassifier.of(choices, vectors)
     of_candidate = replace(

@@ -137,8 +137,9 @@ def fit(data: DataSet | str | Path | Sequence[str | Path], **options: Any) -> Fi
     settings = choose(loaded, y, fixed)
     measured = loaded.dataset.with_kernels(settings.window_s)
     notes = [*doubts, *lacking(loaded.dataset, fixed.tasks), *loaded.notes]
-    notes += [*settings.notes, *_of_unseen(settings, fixed), *leaks(measured, y)]
+    notes += [*_of_unseen(settings, fixed), *leaks(measured, y)]
     points = decision_points(measured, settings, fixed, notes)
+    notes += settings.notes
     if len(points) < 2:
         settings = replace(settings, early=None)
     dataset = measured.of(sorted(settings.features()))

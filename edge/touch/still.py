@@ -49,7 +49,8 @@ class StillTaxels:
     """The taxels that are set aside, so that what happens beside them is followed.
 
     What is above the threshold in the first frame is set aside at once: it may be a
-    stuck taxel, or a touch under way, which changes. Later a taxel is set aside once it
+    stuck taxel, or a touch under way, which changes. Where every taxel is above it, a
+    firm hold is under way, and nothing is set aside. Later a taxel is set aside once it
     has been still. It is taken back when it falls to the threshold, or changes as in a
     touch; where it then returns to its former count, it is set aside at once.
 
@@ -86,29 +87,28 @@ class StillTaxels:
         active = active_taxels(frame, self._layout)
         self._watch(frame, active)
         age_s = frame.t - self._began_s
-        now = View(frame, active)
+        now = View(frame, active, age_s == 0.0)
         if not (self.touched or self.aside.any()):
             self.early = []
             return [now]
         beside = active_taxels(frame, self._layout, self.aside)
-        if self.touched or self._grows(active, beside, age_s):
-            early = self.early if age_s <= EARLY_S else []
+        soon = age_s <= EARLY_S
+        if self.touched or (soon and self.early and _grown(active, beside)):
+            early = self.early if soon else []
             self.early = []
             return [*early, now]
         if age_s == 0.0 or (self.early and age_s <= self._longest_s):
             self.early.append(View(frame, active, late=True))
         return [View(frame, beside)]
 
-    def _grows(self, active: ActiveTaxels, beside: ActiveTaxels, age_s: float) -> bool:
-        """Whether what was set aside in the first frame soon grows."""
-        return age_s <= EARLY_S and bool(self.early) and _grown(active, beside)
-
     def _watch(self, frame: Frame, active: ActiveTaxels) -> None:
         """Set taxels aside or take them back, by a frame and its active taxels."""
         self.touched = False
         if self._next_s == -math.inf:
             self._began_s = frame.t
-            self._set_aside(frame, active.mask)
+            readable = True if frame.valid is None else frame.valid
+            if (active.mask != readable).any():
+                self._set_aside(frame, active.mask)
         elif self.aside.any():
             self._take_back(frame, active.mask)
         if frame.t >= self._next_s:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 
@@ -14,16 +14,17 @@ from train.choose.evaluate import (
     AnswerTable,
     Promise,
     Result,
-    Rule,
     averaged,
     evaluate,
     fits,
 )
 from train.choose.protocols import GroupsLeftOut, TrialsLeftOut, promised
+from train.choose.rule import Rule
 from train.choose.search import SearchGrid
 from train.choose.settings import Chosen, Settings
 from train.data.dataset import DataSet
 from train.data.groups import TRIAL, Divisions, Groups
+from train.data.leaks import late_share
 from train.data.vectors import Labels, Vectors
 from train.model.agreement import families
 from train.model.held_out import held_out
@@ -40,6 +41,8 @@ differences that are small beside the features' spread, which do not carry over 
 objects."""
 WINDOW_MARGIN = 0.02
 """Accuracy that is not worth twice the wait."""
+MOST_LATE = 0.5
+"""Share of late touches above which the most accurate window is taken."""
 
 
 Plan = tuple[Integers, Sequence[Choices]]
@@ -99,15 +102,17 @@ class Choosing:
         *,
         nested: bool,
         repeated: bool = True,
+        halve: bool = True,
     ) -> tuple[AnswerTable, AnswerTable]:
         """The candidates' answers to left-out trials, and to left-out groups where
-        there are any.
+        there are any, each of the tasks that are chosen by them.
 
         Without groups, both are the answers to left-out trials.
         """
         folds = self._divisions.folds
         further_folds = self._divisions.further if repeated else ()
-        grids = [grid for candidate in candidates for grid in candidate.grids]
+        grouped = [task for task in self._y if self._is_grouped(task)]
+        by_trial = for_tasks(candidates, {*self._y}.difference(grouped))
         total = fits(folds, nested)
         total += sum(fits(division, False) for division in further_folds)
         if self._groups is not None:
@@ -119,18 +124,24 @@ class Choosing:
             unit=" fits",
             disable=not self._progress,
         ) as progress:
-            answers = partial(evaluate, jobs=self._jobs, progress=progress.update)
-            trials = answers(vectors, folds, grids, nested=nested)
+            answers = partial(
+                evaluate,
+                vectors,
+                jobs=self._jobs,
+                progress=progress.update,
+                halve=halve,
+            )
+            trials = answers(folds, by_trial, nested=nested)
             further = [
-                answers(vectors, division, grids, nested=False)
-                for division in further_folds
+                answers(division, by_trial, nested=False) for division in further_folds
             ]
             trials = replace(trials, repeated=tuple(further))
             if self._groups is None:
                 return trials, trials
-            vectors = replace(vectors, y=_grouped_labels(self._groups, self._y, grids))
-            unseen = _unseen(self._groups, grids)
-            groups = answers(vectors, self._groups.folds, unseen, nested=nested)
+            carried_over = [c for c in candidates if not c.known]
+            grouped_tasks = _grouped_tasks(self._groups, self._y)
+            unseen = _unseen(self._groups, for_tasks(carried_over, grouped_tasks))
+            groups = answers(self._groups.folds, unseen, nested=nested)
         return trials, groups
 
     def _right(self, window_s: float) -> dict[str, Floats]:
@@ -158,30 +169,44 @@ class Choosing:
 
     def window(self, windows: Sequence[float]) -> tuple[float, list[str]]:
         """The shortest of some windows at which every task is about as accurate as at
-        its best.
+        its best; the best one where most touches are late.
 
-        A task may lose a standard error, or `WINDOW_MARGIN`.
+        A task may lose a standard error, or `WINDOW_MARGIN`. A robot waits for the
+        answer to a touch, but not to one that began before the recording.
 
         Returns:
-            The window in seconds, and sentences that say why.
+            The window in seconds, and sentences that say why, and what a longer one
+            gains.
         """
         if len(windows) == 1:
             return windows[0], []
         by_window = [self._right(window_s) for window_s in windows]
         shortest = Rule(np.arange(len(windows)), margin=WINDOW_MARGIN)
         place = 0
-        shares = []
+        means = {}
         for task in self._y:
             right = np.array([answers[task] for answers in by_window])
             place = max(place, shortest.choose(right))
-            accuracies = zip(right.mean(axis=1), windows, strict=True)
-            of_task = [f"{share:.0%} at {w:g} s" for share, w in accuracies]
-            shares.append(f"{task} {', '.join(of_task)}")
-        return windows[place], [
-            f"the window is {windows[place]:g} s, as the touches last longer than "
-            f"{windows[0]:g} s; in cross-validation {'; '.join(shares)} (--window sets "
-            "it)"
-        ]
+            means[task] = right.mean(axis=1)
+        reason = f"as the touches last longer than {windows[0]:g} s"
+        if late_share(self._dataset) > MOST_LATE:
+            place = int(np.mean(list(means.values()), axis=0).argmax())
+            reason = "the most accurate, as most touches begin before their recording"
+        shares = []
+        gains = []
+        for task, of_task in means.items():
+            accuracies = zip(of_task, windows, strict=True)
+            shares.append(
+                f"{task} {', '.join(f'{a:.0%} at {w:g} s' for a, w in accuracies)}"
+            )
+            best = int(of_task.argmax())
+            if best > place and of_task[best] - of_task[place] > WINDOW_MARGIN:
+                gains.append(
+                    f"--window {windows[best]:g}: {task} {of_task[best]:.0%} instead of "
+                    f"{of_task[place]:.0%} in cross-validation"
+                )
+        note = f"the window is {windows[place]:g} s, {reason}; in cross-validation "
+        return windows[place], [f"{note}{'; '.join(shares)} (--window sets it)", *gains]
 
     def choose(self, window_s: float) -> Settings:
         """Each task's settings."""
@@ -249,7 +274,9 @@ class Choosing:
         dataset = self._dataset.of(features_of(candidates))
         vectors = dataset.vectors(window_s, self._samples, self._y)
         what = f"{window_s:g} s"
-        return self._tables(vectors, candidates, what, nested=False, repeated=False)
+        # A candidate counts by its mean over several windows, so none is dropped.
+        once = {"nested": False, "repeated": False, "halve": False}
+        return self._tables(vectors, candidates, what, **once)
 
     def _settle(
         self,
@@ -266,13 +293,20 @@ class Choosing:
         own_choices = [
             protocol.of_candidate(task, candidate) for candidate in self.candidates
         ]
+        accuracy = promise(protocol.accuracy(task))
+        by_trial = accuracy
+        if protocol is not trials:
+            # `decided_together` counts the answers to left-out trials.
+            total = int((trials.folds >= 0)[self._y[task] != ""].sum())
+            none_right = Result(0, total, hits=np.zeros(total, dtype=bool))
+            by_trial = promised(none_right, untouched)
         chosen = Chosen(
             choice=protocol.choice(task),
-            accuracy=promise(protocol.accuracy(task)),
-            by_trial=promised(trials.answered(task, without), untouched),
+            accuracy=accuracy,
+            by_trial=by_trial,
             left_out=protocol.name,
-            candidates=tuple(promise(result) for result, _ in own_choices),
-            picks=tuple(choice for _, choice in own_choices),
+            candidates=tuple(own and promise(own[0]) for own in own_choices),
+            picks=tuple(own and own[1] for own in own_choices),
             folds=protocol.folds,
         )
         return chosen, without
@@ -289,14 +323,23 @@ def _unseen(groups: Groups, grids: Sequence[SearchGrid]) -> list[SearchGrid]:
     return unseen
 
 
-def _grouped_labels(groups: Groups, y: Labels, grids: Sequence[SearchGrid]) -> Labels:
-    """The labels that answers to left-out groups need: of all tasks where a grid has
-    targets, else of those with groups and of the tasks that agree with them."""
-    if any(grid.targets for grid in grids):
-        return y
+def _grouped_tasks(groups: Groups, y: Labels) -> frozenset[str]:
+    """The tasks with groups, and those that agree with them."""
     together = [family for family in families(y) if groups.tasks & {*family}]
-    tasks = groups.tasks.union(*together)
-    return {task: y[task] for task in y if task in tasks}
+    return groups.tasks.union(*together)
+
+
+def for_tasks(
+    candidates: Sequence[Candidate], tasks: Collection[str]
+) -> list[SearchGrid]:
+    """The grids that are for some of the tasks, as candidates for these alone."""
+    limited = []
+    for candidate in candidates:
+        for grid in candidate.grids:
+            served = tuple(task for task in sorted(tasks) if grid.is_for(task))
+            if served:
+                limited.append(replace(grid, tasks=served))
+    return limited
 
 
 def _by_fold(choices: Mapping[str, Sequence[Choice]]) -> list[dict[str, Choice]]:
@@ -326,7 +369,11 @@ def decided_together(
     together = {}
     for task, settings in chosen.items():
         together[task] = _planned(settings, plans, (task,))
-    for family in families(vectors.y):
+    joined = families(vectors.y)
+    for task, settings in chosen.items():
+        if settings.left_out != TRIAL and not any(task in f for f in joined):
+            joined.append((task,))
+    for family in joined:
         right = {}
         for left_out in {TRIAL, *(chosen[task].left_out for task in family)}:
             right[left_out] = _right_together(family, vectors, plans[left_out], jobs)

@@ -15,12 +15,12 @@ from train.choose.evaluate import (
     AnswerTable,
     Promise,
     Result,
-    Rule,
     chosen,
     chosen_by_fold,
     chosen_by_other_fold,
     nested_accuracy,
 )
+from train.choose.rule import Rule
 from train.data.groups import TRIAL, Groups
 from train.data.labels import NO_CONTACT
 from train.data.vectors import Strings
@@ -93,15 +93,15 @@ class TrialsLeftOut:
         """The nested accuracy of the choice."""
         return nested_accuracy(self.table, task, self.rule(task))
 
-    def answered(self, task: str, by_fold: Sequence[Choice]) -> Result:
-        """The accuracy of the choice `by_fold` for each fold on the trials of it."""
-        choices = self.table.choices[task]
-        return self.table.answered(task, list(map(choices.index, by_fold)))
-
-    def of_candidate(self, task: str, candidate: Candidate) -> tuple[Result, Choice]:
-        """The nested accuracy of a candidate's own choice, and this choice."""
+    def of_candidate(
+        self, task: str, candidate: Candidate
+    ) -> tuple[Result, Choice] | None:
+        """The nested accuracy of a candidate's own choice, and this choice; None where
+        it was dropped, or is none for the task."""
         choices = self.table.choices[task]
         allowed = places_of(candidate, choices)
+        if not any(self.table.is_running(task, place) for place in allowed):
+            return None
         rule = replace(self.rule(task), allowed=allowed, margin=0.0)
         place = chosen(self.table, task, rule)
         return nested_accuracy(self.table, task, rule), choices[place]

@@ -40,7 +40,8 @@ def summary(fitted: Fitted, prices: Prices) -> str:
     text."""
     lines = [
         *_aligned(candidates(fitted, prices)),
-        "* chosen; in brackets, the 95 % interval of the accuracy on other trials",
+        "* chosen; in brackets, the 95 % interval of the accuracy on other trials; "
+        "- dropped after a few folds, as behind or no better than a cheaper one",
         "",
     ]
     for task, chosen in fitted.chosen.items():
@@ -53,7 +54,7 @@ def summary(fitted: Fitted, prices: Prices) -> str:
     if any(map(moves, map(measures.feature, fitted.dataset.names))):
         frame = "along the skin" if fitted.dataset.chain is None else "in the world"
         lines.append(f"contact motion is measured {frame}")
-    return "\n".join([*lines, *fitted.notes, *warnings(fitted)])
+    return "\n".join([*lines, *warnings(fitted), *fitted.notes])
 
 
 def _aligned(table: Table) -> list[str]:
@@ -76,17 +77,21 @@ def _by_unit(units: Mapping[str, str]) -> list[str]:
 
 
 def candidates(fitted: Fitted, prices: Prices) -> Table:
-    """A row for each candidate, with the nested accuracy of its own settings and its
-    price."""
+    """A row for each candidate that was not dropped, with the nested accuracy of its
+    own settings and its price."""
     rows: list[Row] = []
     for i, candidate in enumerate(fitted.candidates):
         pairs = {(grid.features, grid.projection) for grid in candidate.grids}
+        if not any(chosen.candidates[i] for chosen in fitted.chosen.values()):
+            continue
         row: Row = {"features": candidate.name, "projection": candidate.projection}
         for task, chosen in fitted.chosen.items():
             choice = chosen.choice
             star = "*" if (choice.features, choice.projection) in pairs else " "
             result = chosen.candidates[i]
-            row[task] = f"{result.accuracy:.1%} ({interval(result)}){star}"
+            row[task] = "- "
+            if result is not None:
+                row[task] = f"{result.accuracy:.1%} ({interval(result)}){star}"
         us, kilobytes = prices[i]
         row["us per decision"] = round(us, 1)
         row["kB"] = round(kilobytes, 1)

@@ -1,6 +1,8 @@
 """What is above the threshold without a touch is set aside, and followed once it is
 touched."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -85,6 +87,18 @@ def test_a_late_contact_at_the_end_has_the_series_of_the_first_frames():
     (contact,) = tracker.finish()
     assert contact.series().t[-1] == pytest.approx(1.0)
     assert set(contact.series().peak) == {100}
+
+
+@pytest.mark.parametrize("dead", [False, True])
+def test_a_firm_hold_of_every_taxel_is_a_touch_from_the_first_frame(dead):
+    """It is one where a taxel cannot be read, too, and however late it changes."""
+    valid = np.ones(LAYOUT.shape, dtype=bool)
+    valid[0, 0] = not dead
+    stream = []
+    for i in range(100):
+        frame = pressed(LAYOUT, i * PERIOD_S, {...: 200 if i < 75 else 400})
+        stream.append(replace(frame, valid=valid))
+    assert onsets(stream) == [(0.0, True)]
 
 
 def test_a_touch_held_for_the_whole_window_is_not_set_aside_before_its_end():

@@ -222,6 +222,39 @@ def test_touches_that_differ_early_are_told_in_the_usual_window(make_touch, tmp_
     assert early.window_s == 1.2
 
 
+@pytest.fixture
+def window_of(monkeypatch):
+    """The function that chooses among three windows by forty trials with an onset, of
+    which they have some wrong."""
+    wrong = {1.2: range(8), 2.4: (0, 1), 4.8: (2,)}
+
+    def chosen(onset_s):
+        recording = SimpleNamespace(t=np.arange(3.0))
+        trials = [SimpleNamespace(onset_s=onset_s, recording=recording)] * 40
+        dataset = SimpleNamespace(trials=trials, names=(), widths=lambda samples: ())
+        folds = np.arange(40) % 3
+        divisions = Divisions(folds, (), None)
+        choosing = Choosing(dataset, {"t": folds.astype(str)}, (), divisions, samples=1)
+        answers = {w: {"t": 1.0 - np.isin(np.arange(40), wrong[w])} for w in wrong}
+        monkeypatch.setattr(choosing, "_right", answers.get)
+        return choosing.window(tuple(wrong))
+
+    return chosen
+
+
+def test_what_a_longer_window_gains_is_said_with_its_option(window_of):
+    window_s, (note, gain) = window_of(onset_s=0.5)
+    assert window_s == 2.4
+    assert note.startswith("the window is 2.4 s, as the touches last longer than 1.2 s")
+    assert gain == "--window 4.8: t 98% instead of 95% in cross-validation"
+
+
+def test_the_most_accurate_window_is_taken_where_most_touches_are_late(window_of):
+    window_s, (note,) = window_of(onset_s=0.0)
+    assert window_s == 4.8
+    assert "as most touches begin before their recording" in note
+
+
 @pytest.mark.parametrize(
     "words", [{"window_s": 1.2}, {"decision_points_s": (0.6, 1.2)}]
 )
