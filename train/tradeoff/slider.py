@@ -11,10 +11,10 @@ from train.choose.evaluate import Result
 from train.choose.settings import Chosen
 from train.report.score import interval
 from train.tradeoff.choices import unseen
-from train.tradeoff.early import soonest_s
+from train.tradeoff.early import soonest
 from train.tradeoff.front import NAMES, ParetoFront
 from train.tradeoff.measured import Measured
-from train.tradeoff.uses import cheapest
+from train.tradeoff.uses import Use, cheapest, early, fixed
 
 FIRST_S = 1.0
 """The time shown at first; without a script, it stays."""
@@ -73,38 +73,56 @@ def slider(measured: Measured) -> str:
         first_level=at,
         last_level=len(LEVELS) - 1,
         level=FIRST_LEVEL,
-        reached=html.escape(levels[at]),
+        reached=levels[at],
         fronts=fronts(measured),
-        prices="".join(
-            f"<li>{html.escape(line)}</li>" for line in price_lines(measured)
-        ),
+        price=html.escape(price(measured)),
     )
 
 
 def reached(measured: Measured, level: float) -> str:
-    """The time after which each task reaches an accuracy, early and fixed."""
-    texts = []
-    for task in measured.y:
-        times = []
-        early = soonest_s(measured.comparisons[task], level)
-        if early is not None:
-            times.append(f"{early:.2f} s on average (early)")
+    """Rows of a table: the soonest decisions of each task that reach an accuracy,
+    early and after a fixed time, with their commands."""
+    rows = ""
+    for task, compared in measured.comparisons.items():
+        rule = soonest(compared, level)
+        if rule is not None:
+            low, high = rule.mean_interval_s
+            time = f"{rule.mean_s:.2f} s on average ({low:.2f} to {high:.2f}), early"
+            rows += _row(task, time, early(measured, rule))
         results = measured.results(task)
-        fixed = [window for window in results if results[window].accuracy >= level]
-        if fixed:
-            times.append(f"{min(fixed):g} s (fixed)")
-        texts.append(f"{task} {'after ' + ', '.join(times) if times else 'never'}")
-    return "; ".join(texts)
+        able = [window for window in results if results[window].accuracy >= level]
+        if able:
+            use = fixed(measured, task, min(able))
+            rows += _row(task, f"{min(able):g} s, fixed", use)
+        elif rule is None:
+            rows += f"<tr><td>{html.escape(task)}</td><td>never</td><td></td></tr>"
+    return rows
+
+
+def _row(task: str, time: str, use: Use) -> str:
+    """The row of a task: the time and the accuracy of a use, and its commands."""
+    answer = f"after {time}: {_accuracy(use.result)}"
+    commands = ", then ".join(
+        f"<code>{html.escape(command)}</code>" for command in use.commands
+    )
+    return f"<tr><td>{html.escape(task)}</td><td>{answer}</td><td>{commands}</td></tr>"
+
+
+def _accuracy(result: Result) -> str:
+    """An accuracy and its interval in whole percent."""
+    return f"{100 * result.accuracy:.0f} % ({interval(result)})"
 
 
 def fronts(measured: Measured) -> str:
-    """Rows of a table: what the names of `FRONT=` give."""
+    """Rows of a table: what the names of `FRONT=` give for the main task."""
     task = next(iter(measured.y))
+    results = measured.results(task)
     front = ParetoFront.of(measured.points, task, measured.after_s)
     rows = ""
     for name in NAMES:
         point = front.pick(name)
-        text = f"{100 * point.accuracy:.0f} % after {point.milliseconds / 1e3:.2f} s"
+        answer = _accuracy(results[point.window_s])
+        text = f"{html.escape(task)} {answer} after {point.milliseconds / 1e3:.2f} s"
         command = html.escape(measured.commands.front(name))
         rows += (
             f"<tr><td>{name}</td><td>{text}</td><td><code>{command}</code></td></tr>"
@@ -112,26 +130,15 @@ def fronts(measured: Measured) -> str:
     return rows
 
 
-def price_lines(measured: Measured) -> list[str]:
-    """A line for each further price: taxels, recordings, arithmetic, a wrong
-    decision."""
+def price(measured: Measured) -> str:
+    """A sentence: the cheapest use of the main task."""
     task = next(iter(measured.y))
-    lines = []
-    for end, words in ((" taxels", "Fewer taxels"), (" trials", "Fewer recordings")):
-        rows = [row for row in measured.costs if str(row["change"]).endswith(end)]
-        for row in rows[:1]:
-            gain = row.get(f"{task}, points", "")
-            lines.append(f"{words}: {row['change']} gain {task} {gain} points.")
-    arithmetic_ms = 1e3 * measured.board.arithmetic_s
-    lines.append(
-        f"Arithmetic: {arithmetic_ms:.1f} ms a decision on {measured.board.name}."
-    )
     best = cheapest(measured, task)
-    lines.append(
-        f"A wrong decision: at {measured.wrong:g} each, and {measured.second:g} for a "
-        f"second of waiting, {task} is cheapest {best.name}."
+    return (
+        f"If a wrong decision costs {measured.wrong:g}, and a second of waiting "
+        f"{measured.second:g}, {task} is cheapest {best.name}: {_accuracy(best.result)} "
+        f"after {best.seconds:.2f} s, by `{', then '.join(best.commands)}`."
     )
-    return lines
 
 
 def _texts(choice: Chosen) -> dict[str, str]:
