@@ -6,13 +6,13 @@ from train.data.folds import finest
 from train.report.figures import HATCHES, PHONE, STROKES, curve, legend, picture, spread
 from train.report.score import majority, percent, points, shares
 from train.report.section import Figure, Row, Section, Table
-from train.tradeoff.choices import BETWEEN_S, unseen
+from train.tradeoff.choices import unseen
 from train.tradeoff.early import FOLDS, StoppingComparison
 from train.tradeoff.measured import Measured
 from train.tradeoff.slider import slider
 from train.tradeoff.uses import EARLY, cheapest, uses
 
-TITLE_S = (0.4, 1.2)
+TITLE_S = (0.6, 1.2)
 """Windows with their accuracy in a panel's title."""
 ACROSS = 3
 """At most so many panels stand side by side."""
@@ -59,7 +59,7 @@ def early(measured: Measured) -> Section:
             "requested error %": percent(rule.error),
             "right %": percent(1.0 - rule.wrong),
             "mean time s": round(rule.mean_s, 3),
-            "95 % interval": "{:.2f} to {:.2f}".format(*rule.mean_interval_s),
+            "at most s": round(rule.latest_s, 3),
             "points over waiting": points(rule.gain),
             "no label %": percent(rule.unknown),
             "decided early %": percent(rule.early),
@@ -140,13 +140,12 @@ def reasons(measured: Measured) -> Section:
         )
     commands = measured.commands
     windows = ", ".join(f"{window:g}" for window in measured.points)
-    between = " and ".join(f"{window:g}" for window in BETWEEN_S)
     kind = "quick choice" if commands.quick else "choice of `make export`"
     notes += [
         *measured.notes,
         f"All accuracies belong to the {kind}, made at windows of "
-        f"{windows} s; {between} s are skipped where the accuracies of "
-        f"{next(iter(measured.y))} before and after do not differ by more than chance. "
+        f"{windows} s. Windows between two of these were not measured, as the accuracies "
+        f"of {next(iter(measured.y))} there do not differ by more than chance. "
         "To export one of "
         f"the measured models, use `{commands.front('fast')}`, or `balanced` (a window "
         "of at most 0.9 s) or `accurate` in place of `fast`; `500` is the most accurate "
@@ -174,8 +173,9 @@ GLOSSARY = {
         "The 95 % interval for the exported model's accuracy on other contacts. It is "
         "Wilson's binomial interval for two fifths of the contacts, because the "
         "exported model differs from those that were tested. `make risk` counts how "
-        "often it holds. Early decisions and fixed windows have the same contacts. The "
-        "interval of a mean time is the normal one, for as many contacts."
+        "often it holds. Early decisions and fixed windows have the same contacts. A "
+        "mean time has the normal interval's upper end, as the exported model is sure "
+        "sooner than those that were tested."
     ),
     "points": (
         "The percentage of decisions that become right less the percentage that become "

@@ -86,8 +86,9 @@ def reached(measured: Measured, level: float) -> str:
     for task, compared in measured.comparisons.items():
         rule = soonest(compared, level)
         if rule is not None:
-            low, high = rule.mean_interval_s
-            time = f"{rule.mean_s:.2f} s on average ({low:.2f} to {high:.2f}), early"
+            time = (
+                f"{rule.mean_s:.2f} s on average (at most {rule.latest_s:.2f}), early"
+            )
             rows += _row(task, time, early(measured, rule))
         results = measured.results(task)
         able = [window for window in results if results[window].accuracy >= level]

@@ -36,7 +36,7 @@ def test_the_interval_is_that_which_the_front_promises():
 def test_the_time_of_an_accuracy_is_told_early_and_fixed_with_its_commands():
     """An early decision of 95 of 100 contacts, whose times differ by 0.1 s."""
     early, fixed, other, _ = html.unescape(reached(MEASURED, 0.9)).split("</tr>")
-    assert "after 0.50 s on average (0.47 to 0.53), early: 95 % (83 to 99)" in early
+    assert "after 0.50 s on average (at most 0.53), early: 95 % (83 to 99)" in early
     assert f"<code>{EARLY} 0.2:1.2:0.1'</code>, then " in early
     assert "<code>edge-classify run --error 0.1</code>" in early
     assert "<td>mobility</td><td>after 1 s, fixed: 97 % (86 to 99)</td>" in fixed
@@ -107,6 +107,6 @@ def test_in_a_browser_the_other_slider_moves_the_accuracy(tmp_path):
             ".map(input => input.getAttribute('aria-valuetext'))"
         )
     assert "60 % right" in text
-    assert "after 0.50 s on average (0.47 to 0.53), early" in text
+    assert "after 0.50 s on average (at most 0.53), early" in text
     assert spoken[0].startswith("60 % right: mobility after 0.50 s on average")
     assert spoken[1] == "1 seconds: mobility 97 %, <b> 80 %"

@@ -90,17 +90,20 @@ def test_the_front_has_the_windows_that_no_other_beats_in_both():
     assert (best[0].low, best[0].high) == wilson(20, 40)
 
 
-def test_a_window_on_a_flat_part_of_the_curve_is_left_out(monkeypatch):
-    """Ninety trials more at 1 s than at 0.8 s, and one more at 1.2 s."""
-    right = {0.8: 5, 0.9: 50, 1.0: 95, 1.1: 95, 1.2: 96}
+def test_windows_are_measured_where_the_curve_is_steep(monkeypatch):
+    """Ninety trials more at 1 s than at 0.8 s, and no more than one before and after."""
+    right = {0.2: 4, 0.4: 4, 0.6: 5, 0.8: 5, 0.9: 50, 1.0: 95, 1.1: 95, 1.2: 96}
+    made = []
 
     def choice(dataset, window_s, quick):
+        made.append(window_s)
         return {"t": chosen(right[window_s])}
 
     monkeypatch.setattr(choices, "chosen", choice)
     workers = Workers(progress=False)
     points = choices.choices_at(None, list(right), "t", workers, quick=True)
-    assert list(points) == [0.8, 0.9, 1.0, 1.2]
+    assert list(points) == [0.2, 0.6, 0.8, 0.9, 1.0, 1.2]
+    assert made == [0.2, 0.6, 1.2, 0.9, 0.8, 1.0]
 
 
 def test_unseen_objects_have_a_figure_only_where_they_were_left_out():
@@ -298,12 +301,9 @@ class TestEarly:
         assert soon.result.right == late.result.right == 3
         assert soon.gain[0] == 0.0
 
-    def test_a_mean_time_has_an_interval(self):
-        decisions = rule(mean_s=0.5)
-        low, high = decisions.mean_interval_s
-        assert low + high == pytest.approx(1.0)
+    def test_a_mean_time_has_the_upper_end_of_an_interval(self):
         reach = 1.96 * 0.1 * (VARIANCE / 100) ** 0.5
-        assert high - 0.5 == pytest.approx(reach, rel=1e-4)
+        assert rule(mean_s=0.5).latest_s == pytest.approx(0.5 + reach, rel=1e-4)
 
     @pytest.mark.slow
     def test_clear_contacts_are_decided_at_the_first_decision_point(self, tmp_path):
