@@ -3,7 +3,7 @@ other."""
 
 import html
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from string import Template
 
@@ -14,7 +14,7 @@ from train.tradeoff.choices import unseen
 from train.tradeoff.early import soonest
 from train.tradeoff.front import NAMES, ParetoFront
 from train.tradeoff.measured import Measured
-from train.tradeoff.uses import Use, cheapest, early, fixed
+from train.tradeoff.uses import cheapest, early, fixed
 
 FIRST_S = 1.0
 """The time shown at first; without a script, it stays."""
@@ -75,7 +75,6 @@ def slider(measured: Measured) -> str:
         level=FIRST_LEVEL,
         reached=levels[at],
         fronts=fronts(measured),
-        price=html.escape(price(measured)),
     )
 
 
@@ -83,30 +82,30 @@ def reached(measured: Measured, level: float) -> str:
     """Rows of a table: the soonest decisions of each task that reach an accuracy,
     early and after a fixed time, with their commands."""
     rows = ""
-    for task, compared in measured.comparisons.items():
-        rule = soonest(compared, level)
+    for task in measured.y:
+        rule = soonest(measured.comparisons[task], level)
         if rule is not None:
             time = (
                 f"{rule.mean_s:.2f} s on average (at most {rule.latest_s:.2f}), early"
             )
-            rows += _row(task, time, early(measured, rule))
+            use = early(measured, rule)
+            rows += _row(task, f"after {time}: {_accuracy(use.result)}", use.commands)
         results = measured.results(task)
         able = [window for window in results if results[window].accuracy >= level]
         if able:
             use = fixed(measured, task, min(able))
-            rows += _row(task, f"{min(able):g} s, fixed", use)
+            answer = f"after {min(able):g} s, fixed: {_accuracy(use.result)}"
+            rows += _row(task, answer, use.commands)
         elif rule is None:
-            rows += f"<tr><td>{html.escape(task)}</td><td>never</td><td></td></tr>"
+            rows += _row(task, "never", ())
     return rows
 
 
-def _row(task: str, time: str, use: Use) -> str:
-    """The row of a task: the time and the accuracy of a use, and its commands."""
-    answer = f"after {time}: {_accuracy(use.result)}"
-    commands = ", then ".join(
-        f"<code>{html.escape(command)}</code>" for command in use.commands
-    )
-    return f"<tr><td>{html.escape(task)}</td><td>{answer}</td><td>{commands}</td></tr>"
+def _row(name: str, answer: str, commands: Sequence[str]) -> str:
+    """A row of a table, whose last cell has the commands that make the answer."""
+    codes = [f"<code>{html.escape(command)}</code>" for command in commands]
+    cells = (html.escape(name), html.escape(answer), ", then ".join(codes))
+    return f"<tr>{''.join(f'<td>{cell}</td>' for cell in cells)}</tr>"
 
 
 def _accuracy(result: Result) -> str:
@@ -115,7 +114,8 @@ def _accuracy(result: Result) -> str:
 
 
 def fronts(measured: Measured) -> str:
-    """Rows of a table: what the names of `FRONT=` give for the main task."""
+    """Rows of a table for the main task: what the names of `FRONT=` give, and the
+    cheapest use."""
     task = next(iter(measured.y))
     results = measured.results(task)
     front = ParetoFront.of(measured.points, task, measured.after_s)
@@ -123,23 +123,14 @@ def fronts(measured: Measured) -> str:
     for name in NAMES:
         point = front.pick(name)
         answer = _accuracy(results[point.window_s])
-        text = f"{html.escape(task)} {answer} after {point.milliseconds / 1e3:.2f} s"
-        command = html.escape(measured.commands.front(name))
-        rows += (
-            f"<tr><td>{name}</td><td>{text}</td><td><code>{command}</code></td></tr>"
-        )
-    return rows
-
-
-def price(measured: Measured) -> str:
-    """A sentence: the cheapest use of the main task."""
-    task = next(iter(measured.y))
+        text = f"{task}: {answer} after {point.milliseconds / 1e3:.2f} s"
+        rows += _row(name, text, (measured.commands.front(name),))
     best = cheapest(measured, task)
-    return (
-        f"If a wrong decision costs {measured.wrong:g}, and a second of waiting "
-        f"{measured.second:g}, {task} is cheapest {best.name}: {_accuracy(best.result)} "
-        f"after {best.seconds:.2f} s, by `{', then '.join(best.commands)}`."
+    text = (
+        f"{task}: {_accuracy(best.result)} after {best.seconds:.2f} s, where a wrong "
+        f"decision costs {measured.wrong:g} and a second of waiting {measured.second:g}"
     )
+    return rows + _row("cheapest", text, best.commands)
 
 
 def _texts(choice: Chosen) -> dict[str, str]:

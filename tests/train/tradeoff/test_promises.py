@@ -63,26 +63,17 @@ def promised(report):
     the front, and of the cheapest use."""
     text = report.read_text()
     data = json.loads(html.unescape(re.search('data-answers="(.*?)"', text)[1]))
+    (table,) = re.findall('<table class="fronts">(.*?)</table>', text, re.DOTALL)
     figures = set()
-    for rows in data["reached"]:
-        for task, answer, codes in ROW.findall(rows):
-            commands = tuple(map(html.unescape, CODE.findall(codes)))
-            if commands:
-                figures.add(Promised(task, answer, commands))
+    for name, answer, codes in ROW.findall("".join([*data["reached"], table])):
+        commands = tuple(map(html.unescape, CODE.findall(codes)))
+        if commands:
+            task = name if name in data["names"] else answer.split(":")[0]
+            figures.add(Promised(task, answer, commands))
     for task, answers in zip(data["names"], data["tasks"], strict=True):
         for answer, command in zip(answers, data["commands"], strict=True):
             shown = f"{answer['share']} {answer['interval']}"
             figures.add(Promised(task, shown, (command,)))
-    (table,) = re.findall('<table class="fronts">(.*?)</table>', text, re.DOTALL)
-    for _, answer, code in ROW.findall(table):
-        task, *_ = answer.split()
-        commands = tuple(map(html.unescape, CODE.findall(code)))
-        figures.add(Promised(task, answer, commands))
-    price = html.unescape(re.search('<p class="price">(.*?)</p>', text)[1])
-    task, _, commands = re.search(
-        r"waiting \d+, (\w+) is (.*), by `(.*)`", price
-    ).groups()
-    figures.add(Promised(task, price, tuple(commands.split(", then "))))
     return figures
 
 

@@ -22,7 +22,6 @@ from export.__main__ import main
 from tests import browser
 from tests.conftest import export, rows_of, save_touches
 from tests.train.tradeoff.examples import chosen, measured, rule
-from train.choose.evaluate import VARIANCE
 from train.commands.tradeoff import cost
 from train.data.dataset import Recordings, read
 from train.data.parts import part
@@ -300,10 +299,6 @@ class TestEarly:
         # At the full window one more is right and one names nothing.
         assert soon.result.right == late.result.right == 3
         assert soon.gain[0] == 0.0
-
-    def test_a_mean_time_has_the_upper_end_of_an_interval(self):
-        reach = 1.96 * 0.1 * (VARIANCE / 100) ** 0.5
-        assert rule(mean_s=0.5).latest_s == pytest.approx(0.5 + reach, rel=1e-4)
 
     @pytest.mark.slow
     def test_clear_contacts_are_decided_at_the_first_decision_point(self, tmp_path):
