@@ -54,10 +54,7 @@ def early(measured: Measured, rule: Certified) -> Use:
         f"early, at most {rule.error:.0%} wrong",
         rule.mean_s + measured.after_s,
         rule.result,
-        (
-            measured.commands.export(*EARLY),
-            f"edge-classify run --error {rule.error:g}",
-        ),
+        (measured.commands.export(*EARLY), measured.commands.run(rule.error)),
     )
 
 

@@ -39,7 +39,9 @@ def test_the_time_of_an_accuracy_is_told_early_and_fixed_with_its_commands():
     early, fixed, other, _ = html.unescape(reached(MEASURED, 0.9)).split("</tr>")
     assert "after 0.50 s on average (at most 0.53), early: 95 % (83 to 99)" in early
     assert f"<code>{EARLY} 0.2:1.2:0.1'</code>, then " in early
-    assert "<code>edge-classify run --error 0.1</code>" in early
+    assert (
+        "<code>edge-classify run --model build/model.onnx --error 0.1</code>" in early
+    )
     assert "<td>mobility</td><td>after 1 s, fixed: 97 % (86 to 99)</td>" in fixed
     assert "<code>make export DATA=mine EXPORT='--window 1'</code>" in fixed
     assert "<td><b></td><td>after 1.2 s, fixed: 91 % (78 to 97)</td>" in other

@@ -258,7 +258,7 @@ def test_the_cheapest_use_may_be_early_and_its_price_has_an_interval():
     low, high = decisions.result.interval
     ends = [round(10.0 * (1.0 - share) + 0.6, 2) for share in (high, low)]
     assert row["95 % interval"] == f"{ends[0]:g} to {ends[1]:g}"
-    assert "edge-classify run --error 0.1" in row["command"]
+    assert "run --model build/model.onnx --error 0.1" in row["command"]
 
 
 def comparison(right, seconds=(0.2, 0.6, 1.0)):
