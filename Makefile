@@ -216,8 +216,7 @@ else
 BOARD := $(OUT)/tradeoff/board.json
 tradeoff: $(READY)
 	$(BIN)/python -m train tradeoff --data $(RECORDINGS) --out $(OUT)/tradeoff --check
-	$(BIN)/python -m export --data $(RECORDINGS) --out $(OUT)/tradeoff \
-	  $(filter --quick,$(TRADEOFF))
+	$(BIN)/python -m export --data $(RECORDINGS) --out $(OUT)/tradeoff --quick
 	$(BIN)/edge-classify bench --model $(OUT)/tradeoff/model.onnx --out $(BOARD)
 endif
 	$(BIN)/python -m train tradeoff --data $(RECORDINGS) $(STUDIED) --board $(BOARD) \

@@ -177,7 +177,7 @@ def _left_out(dataset: DataSet) -> Iterator[str]:
 
 
 def _outliers(fitted: Fitted) -> Iterator[str]:
-    """Sentences on recordings far outside all others.
+    """Sentences on recordings far outside all others, by features of the model.
 
     Features of single taxels are left out: most trials do not touch a taxel, so that
     any touch of it lies far outside.
@@ -188,15 +188,12 @@ def _outliers(fitted: Fitted) -> Iterator[str]:
     more = len(by_joints) - NAMED
     if more > 0:  # angles in degrees are beyond the limits in every recording
         yield f"warning: {counted(more, 'further recording')} with such joint angles"
-    names = [n for n in measured.names if not measures.feature(n).wide]
+    names = [n for n in fitted.dataset.names if not measures.feature(n).wide]
     names = [name for name in names if "kernels" not in name]
-    if not names:
-        return
-    measured_of_names = measured.of(names)
-    X = measured_of_names.features(fitted.window_s, fitted.samples)
-    yield from outliers.by_features(
-        measured_of_names, X, measured_of_names.widths(fitted.samples)
-    )
+    if names:
+        used = fitted.dataset.of(names)
+        X = used.features(fitted.window_s, fitted.samples)
+        yield from outliers.by_features(used, X, used.widths(fitted.samples))
 
 
 def _task_warnings(fitted: Fitted, task: str) -> Iterator[str]:
