@@ -1,9 +1,8 @@
-"""Recordings written and found: files of one trial each."""
+"""Recordings written: files of one trial each."""
 
 import json
 import logging
 import os
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -88,31 +87,3 @@ def save_arrays(
     write = np.savez_compressed if compress else np.savez
     with write_whole(path, overwrite=overwrite, lasting=lasting) as file:
         write(file, meta=np.array(text), **arrays)  # type: ignore[arg-type]
-
-
-def find(paths: list[str]) -> list[Path]:
-    """The `.npz` files named, and those in the folders named (sorted, folders within
-    too).
-
-    Raises:
-        InputError: a folder holds no recording.
-    """
-    files: list[Path] = []
-    for path in map(Path, paths):
-        # Path.is_dir raises for a name that is too long.
-        inside = recordings_in(path) if os.path.isdir(path) else [path]
-        if not inside:
-            raise InputError(f"{path}: no .npz recording in this folder")
-        files += inside
-    return files
-
-
-def recordings_in(folder: Path) -> list[Path]:
-    """The `.npz` files in a folder and in those within it, but for hidden ones, such as
-    deleted recordings; sorted."""
-    files = []
-    for path in folder.rglob("*.npz"):
-        names = path.relative_to(folder).parts
-        if not any(name.startswith(".") for name in names):
-            files.append(path)
-    return sorted(files)

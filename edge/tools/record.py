@@ -30,6 +30,7 @@ from edge.commands.source import Opened, reading
 from edge.errors import InputError
 from edge.events import Decided, Event
 from edge.files import refusing
+from edge.folders import DELETED
 from edge.model.model import Model
 from edge.output.event_writer import Lines
 from edge.recording import Recording
@@ -37,7 +38,6 @@ from edge.saving import save
 from edge.skin import file as skinfile
 from edge.skin.file import SkinFile
 from edge.skin.skin import Skin
-from edge.tools.label import DELETED
 from edge.tools.review import decisions_of
 from edge.tools.trial_options import add_arm, open_arm, task_label
 from edge.touch.arm import Chain
