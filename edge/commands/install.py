@@ -21,7 +21,7 @@ from edge.model.model import LARGEST_BYTES, Model
 from edge.model.verify import golden_of, verify
 from edge.skin.file import load
 from edge.touch.differences import differences
-from edge.writing import check_writable, write_whole
+from edge.writing import remove_leftovers, write_whole
 
 FORMER = ".former"
 """Ends the name of the model that was replaced."""
@@ -65,7 +65,7 @@ def run(arguments: argparse.Namespace) -> int:
     """Install, or go back; 1 if the new model did not prove itself."""
     output = Output.of(arguments)
     target = arguments.to
-    check_writable(target.parent)
+    remove_leftovers(target.parent)
     finish(target)
     if arguments.back:
         go_back(target)

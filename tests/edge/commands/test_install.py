@@ -11,6 +11,7 @@ import pytest
 from edge.commands import install
 from edge.model.model import Model
 from edge.model.verify import golden_of
+from tests.edge.test_writing import left_by_a_dead_run
 
 
 class Killed(BaseException):
@@ -47,8 +48,10 @@ def test_a_verified_model_takes_the_place_of_the_former_one_which_is_kept(
     new,
     running,
 ):
+    leftover = left_by_a_dead_run(running.parent)
     status, (event,), _ = installed()
     assert status == 0
+    assert not leftover.exists()
     assert event == {"event": "installed", "version": Model(new).version}
     assert running.read_bytes() == new.read_bytes()
     assert running.with_name("model.onnx.former").read_bytes() == b"former model"
