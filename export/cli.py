@@ -12,9 +12,9 @@ from joblib import cpu_count
 from edge.cli import dispatch
 from edge.commands.options import within
 from edge.errors import InputError
-from edge.folders import find
 from edge.model.model import Model
 from edge.recording import load
+from edge.saving import find
 from edge.tools.replay import Summary, compared, decide
 from edge.tools.slips import counts_text
 from edge.tools.trial_options import add_arm, open_arm

@@ -18,8 +18,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from edge import demo
-from edge.folders import find
 from edge.recording import load
+from edge.saving import find
 from edge.writing import PREFIX
 from tests.bench import tables
 from tests.bench.program import start

@@ -3,7 +3,7 @@
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 
-from edge.folders import recordings_in
+from edge.saving import recordings_in
 
 
 def warnings(folder: Path, written: Iterable[Path]) -> Iterator[str]:

@@ -11,10 +11,10 @@ from typing import Any
 
 from edge.commands.output import Output, counted
 from edge.commands.texts import wrapped
-from edge.folders import find
 from edge.model.info import ModelInfo
 from edge.model.model import Model
 from edge.recording import Recording, load
+from edge.saving import find
 from edge.tools.explanation import Near, Space, explain
 from edge.tools.replay import contact_of
 

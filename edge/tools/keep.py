@@ -13,10 +13,9 @@ from edge.commands.output import LOG, counted
 from edge.commands.source import Opened
 from edge.errors import EdgeError, InputError
 from edge.events import Decided, Event
-from edge.folders import alone
 from edge.model.info import UNKNOWN, ModelInfo
 from edge.recording import load_arrays, load_meta
-from edge.saving import save
+from edge.saving import alone, save
 from edge.tools.record import Trials, recording, shared_meta
 from edge.tools.review import UNSURE, decisions_of
 from edge.touch.frame import Frame

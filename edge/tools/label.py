@@ -16,8 +16,8 @@ from typing import Any
 from edge.commands.output import Output, counted
 from edge.commands.texts import labels_text
 from edge.errors import InputError
-from edge.folders import alone, change_all, find, take_back
 from edge.recording import Recording, load
+from edge.saving import alone, change_all, find, take_back
 from edge.tools import review
 from edge.tools.slips import counts_text, slips
 from edge.tools.trial_options import task_label

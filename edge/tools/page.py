@@ -15,8 +15,8 @@ import numpy as np
 
 from edge.errors import InputError
 from edge.events import Decided, Event, Onset
-from edge.folders import alone, change_all, finish_interrupted, take_back
 from edge.recording import Recording, load
+from edge.saving import alone, change_all, finish_interrupted, take_back
 from edge.skin.loop import Schedule
 from edge.tools import review
 from edge.tools.label import changed

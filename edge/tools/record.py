@@ -30,11 +30,10 @@ from edge.commands.source import Opened, reading
 from edge.errors import InputError
 from edge.events import Decided, Event
 from edge.files import refusing
-from edge.folders import DELETED
 from edge.model.model import Model
 from edge.output.event_writer import Lines
 from edge.recording import Recording
-from edge.saving import save
+from edge.saving import DELETED, save
 from edge.skin import file as skinfile
 from edge.skin.file import SkinFile
 from edge.skin.skin import Skin

@@ -17,11 +17,11 @@ from edge.classifier import Classifier, suited
 from edge.commands.options import add_engine, add_error, check_error
 from edge.commands.output import LOG, Output, counted
 from edge.errors import InputError, about, printable
-from edge.folders import find
 from edge.model.info import Task
 from edge.model.model import Model
 from edge.model.verify import first_series
 from edge.recording import Recording, load
+from edge.saving import find
 from edge.statistics import wilson
 from edge.touch.contact import FeatureSeries
 

@@ -9,9 +9,8 @@ import numpy as np
 import pytest
 
 from edge.errors import InputError
-from edge.folders import find
 from edge.recording import LARGEST_BYTES, Recording, load
-from edge.saving import save
+from edge.saving import find, save
 
 
 def test_what_is_saved_is_loaded(make_touch, tmp_path):

@@ -11,7 +11,7 @@ from contextlib import suppress
 from pathlib import Path
 
 from edge.errors import InputError
-from edge.folders import find
+from edge.saving import find
 from edge.writing import check_writable
 
 

@@ -17,8 +17,8 @@ from joblib import Parallel, delayed
 from edge.arrays import Booleans, Floats
 from edge.errors import InputError
 from edge.files import read_bytes
-from edge.folders import find
 from edge.recording import LARGEST_BYTES, Recording, load
+from edge.saving import find
 from edge.touch import measures
 from edge.touch.arm import Chain
 from edge.touch.contact import feature_types

@@ -6,9 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from edge.folders import change_all, find
 from edge.recording import load
-from edge.saving import save
+from edge.saving import change_all, find, save
 from tests.edge.tools.kept import kept_meta
 
 
