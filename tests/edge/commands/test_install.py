@@ -11,6 +11,7 @@ import pytest
 from edge.commands import install
 from edge.model.model import Model
 from edge.model.verify import golden_of
+from tests.conftest import sealed
 from tests.edge.test_writing import left_by_a_dead_run
 
 
@@ -69,7 +70,7 @@ def old(new, running):
     """The place of a running model that is as good as the new one."""
     former = onnx.load(new)
     former.doc_string = "former"
-    onnx.save(former, running)
+    running.write_bytes(sealed(former))
     return running.read_bytes()
 
 
@@ -121,7 +122,7 @@ def test_a_kill_at_any_step_loses_no_model_and_mixes_none(
     first = running.read_bytes()
     third = onnx.load(new)
     third.doc_string = "third"
-    onnx.save(third, new)
+    new.write_bytes(sealed(third))
     back = ("install", "--back", "--to", running)
     for step in range(4):
         running.write_bytes(first)
@@ -143,7 +144,7 @@ def test_golden_files_of_models_that_are_gone_are_removed(installed, new, runnin
     for name in "abc":
         model = onnx.load(new)
         model.doc_string = name
-        onnx.save(model, new)
+        new.write_bytes(sealed(model))
         installed()
         versions.append(Model(new).version)
     left = {path.name for path in running.parent.glob("golden-*.npz")}
