@@ -100,15 +100,13 @@ def message_of(value: memoryview) -> Message:
     at = 0
     while at < len(value):
         key, at = _varint(value, at)
-        size = {1: 8, 5: 4}.get(key & 7)
+        size: Any = {1: 8, 5: 4}.get(key & 7)
         if key & 7 in (0, 2):
             size, at = _varint(value, at)
-        content: Any = size
+        content = size
         if key & 7:
-            if size is None or at + size > len(value):
-                raise ValueError(
-                    "a field of an unknown kind, or one that runs past its message"
-                )
+            if at + size > len(value):  # a TypeError where the field's kind is unknown
+                raise ValueError("a field that runs past its message")
             content = value[at : at + size]
             at += size
         fields[key >> 3].append(content)
@@ -180,8 +178,7 @@ def _read_node(fields: Message, contents: Contents) -> None:
     domain = text_of(fields, DOMAIN)
     operator = text_of(fields, OPERATOR)
     if domain not in ("", "ai.onnx") or operator not in OPERATORS:
-        foreign = f"operator {domain}.{operator}".replace(" .", " ")
-        contents.foreign.append(foreign)
+        contents.foreign.append(f"operator {domain}.{operator}".replace(" .", " "))
     attributes = {}
     for attribute in messages(fields, ATTRIBUTES):
         if not attribute.keys() <= NUMBERS:
@@ -189,8 +186,7 @@ def _read_node(fields: Message, contents: Contents) -> None:
         if WHOLE in attribute:
             value = attribute[WHOLE][-1]
             # Negative numbers are stored modulo 2^64.
-            negative = value >= 1 << 63
-            attributes[text_of(attribute, 1)] = value - (1 << 64) * negative
+            attributes[text_of(attribute, 1)] = value - (value >> 63 << 64)
     inputs = _texts(fields, 1)
     contents.nodes.append(Node(operator, inputs, _texts(fields, 2), attributes))
 
