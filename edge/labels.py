@@ -1,11 +1,34 @@
 """Tasks whose labels are made of two others' labels: a category is softness by
 mobility."""
 
+import logging
 from collections.abc import Mapping
 from dataclasses import dataclass
 
+from edge.errors import InputError
+
+LOG = logging.getLogger(__name__)
+
 Labels = Mapping[str, str]
 """{task: label} of a trial."""
+
+
+def plain(labels: Labels, path: str) -> dict[str, str]:
+    """Labels of a file with a space in place of characters that cannot be printed, and
+    none at their ends; a warning says so.
+
+    Raises:
+        InputError: nothing is left of one.
+    """
+    texts = []
+    for text in (*labels, *labels.values()):
+        shown = "".join(c if c.isprintable() else " " for c in text)
+        texts.append(" ".join(shown.split()))
+    if not all(texts):
+        raise InputError(f"the labels {dict(labels)} hold nothing that can be read")
+    read = dict(zip(texts, texts[len(labels) :], strict=False))
+    LOG.warning(f"{path}: the labels {dict(labels)} are read as {read}")
+    return read
 
 
 @dataclass(frozen=True)

@@ -1,20 +1,68 @@
-"""Recordings written and found: files of one trial each."""
+"""Recordings in folders: written, found, and changed by one program at a time.
+
+A change of labels, or a deletion, is noted in a journal in each folder, then carried out.
+The first folder's journal is written last: from then on the change counts, and whatever
+reads the folders finishes it; before, nothing has changed. In the end a journal becomes
+the note by which the change is taken back.
+"""
 
 import json
 import logging
 import os
+import shutil
+import time
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import ExitStack, contextmanager, suppress
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from edge.arrays import Array
-from edge.errors import InputError
-from edge.recording import KEYS, Recording, checked, warn_of_another_unit
+from edge.config import parse_json
+from edge.errors import InputError, about
+from edge.files import parsing, read_text, refusing
+from edge.labels import Labels
+from edge.recording import KEYS, Recording, checked, load, warn_of_another_unit
 from edge.touch.thresholds import doubt
-from edge.writing import write_whole
+from edge.writing import lock, remove_leftovers, write_whole
 
 LOG = logging.getLogger(__name__)
+JOURNAL = ".edge-classify-labels.json"
+"""The journal of a change that is not finished."""
+UNDO = ".edge-classify-undo.json"
+"""The note of the last change."""
+DELETED = ".edge-classify-deleted"
+"""The folder of recordings that were deleted last."""
+PATIENCE_S = 10.0
+"""Longest time to wait for another program."""
+LOOK_S = 0.02
+
+
+Pair = tuple[Labels | None, Labels | None]
+"""The labels of a recording before and after a change; None where it is deleted."""
+
+
+@dataclass(frozen=True)
+class Change:
+    """What changes in a folder.
+
+    Attributes:
+        number: the same in all folders of the change.
+        folders: of the change; "." is this one. The first one's journal decides.
+        labels: {file: its labels before and after}.
+        undo: whether it takes the last change back.
+    """
+
+    number: str = ""
+    folders: Sequence[str] = ()
+    labels: dict[str, Pair] = field(default_factory=dict)
+    undo: bool = False
+
+    def places(self, folder: Path) -> list[Path]:
+        """The folders of the change, which is noted in one of them."""
+        return [folder / name for name in self.folders]
 
 
 def save(
@@ -90,17 +138,20 @@ def save_arrays(
         write(file, meta=np.array(text), **arrays)  # type: ignore[arg-type]
 
 
-def find(paths: list[str]) -> list[Path]:
+def find(paths: Iterable[str]) -> list[Path]:
     """The `.npz` files named, and those in the folders named (sorted, folders within
-    too).
+    too), after interrupted changes are finished.
 
     Raises:
-        InputError: a folder holds no recording.
+        InputError: a folder holds no recording, or a change cannot be finished.
     """
     files: list[Path] = []
     for path in map(Path, paths):
         # Path.is_dir raises for a name that is too long.
-        inside = recordings_in(path) if os.path.isdir(path) else [path]
+        is_folder = os.path.isdir(path)
+        parents = path.rglob(JOURNAL) if is_folder else [path]
+        finish_interrupted({file.parent for file in parents})
+        inside = recordings_in(path) if is_folder else [path]
         if not inside:
             raise InputError(f"{path}: no .npz recording in this folder")
         files += inside
@@ -116,3 +167,193 @@ def recordings_in(folder: Path) -> list[Path]:
         if not any(name.startswith(".") for name in names):
             files.append(path)
     return sorted(files)
+
+
+def finish_interrupted(folders: Iterable[Path]) -> None:
+    """Wait for changes in folders that are under way, and finish interrupted ones.
+
+    Raises:
+        InputError: a change takes long, or cannot be finished.
+    """
+    with alone(folder for folder in folders if os.path.lexists(folder / JOURNAL)):
+        pass
+
+
+@contextmanager
+def alone(folders: Iterable[Path]) -> Iterator[None]:
+    """Let no other program change the folders' recordings during the block, and finish
+    interrupted changes first.
+
+    Raises:
+        InputError: another program changes them, or a change cannot be finished.
+    """
+    waiting = sorted({folder.absolute() for folder in folders})
+    locked: list[Path] = []
+    with ExitStack() as stack:
+        for folder in waiting:  # the other folders of a change are added on the way
+            if folder not in locked:
+                stack.enter_context(_locked(folder))
+                locked.append(folder)
+                remove_leftovers(folder)
+                change = _noted(folder)
+                waiting += change.places(folder) if change else []
+        for folder in locked:
+            with about(f"{folder}: a change of labels was interrupted"):
+                finished = len(_finish(folder))
+            if finished:
+                LOG.warning(
+                    f"{folder}: finished a change of labels that was interrupted; "
+                    f"recordings: {finished}"
+                )
+        yield
+
+
+@contextmanager
+def _locked(folder: Path) -> Iterator[None]:
+    """Lock a folder, if the system can."""
+    with ExitStack() as stack:
+        with suppress(OSError):  # Windows opens no folder; a missing one is named later
+            handle = os.open(folder, os.O_RDONLY)
+            stack.callback(os.close, handle)
+            _lock(handle, folder)
+        yield
+
+
+def _lock(handle: int, folder: Path) -> None:
+    """Wait for other programs, and lock a folder.
+
+    Raises:
+        InputError: another program takes long.
+    """
+    latest = time.monotonic() + PATIENCE_S
+    while True:
+        try:
+            return lock(handle)
+        except BlockingIOError:
+            if time.monotonic() > latest:
+                raise InputError(
+                    f"{folder}: another program is changing labels here; try again when "
+                    "it has ended"
+                ) from None
+        time.sleep(LOOK_S)
+
+
+def _noted(folder: Path, name: str = JOURNAL) -> Change | None:
+    """The change that a file of a folder tells of.
+
+    Raises:
+        InputError: the file is damaged.
+    """
+    note = folder / name
+    if not note.is_file():
+        return None
+    entries = parse_json(read_text(note), str(note))
+    with parsing(str(note), "a change of labels", "; delete it"):
+        change = Change(**entries)
+        change.places(folder)[0].is_dir()
+        labels = {Path(file).name: (a, b) for file, (a, b) in change.labels.items()}
+    return replace(change, labels=labels)
+
+
+def _finish(folder: Path) -> list[Path]:
+    """Carry out, in all its folders, the change that is noted in a folder, if one is;
+    the recordings that it changed."""
+    change = _noted(folder)
+    if change is None:
+        return []
+    of_change: dict[Path, Change] = {}
+    for place in change.places(folder):
+        noted = _noted(place)
+        if noted and noted.number == change.number:
+            of_change[place] = noted
+    if change.places(folder)[0] not in of_change:
+        (folder / JOURNAL).unlink()
+        return []
+    changed = []
+    # The journal that decides is the last to go.
+    for place, noted in reversed(of_change.items()):
+        changed += _carry_out(place, noted)
+    return changed
+
+
+def _carry_out(folder: Path, change: Change) -> list[Path]:
+    """Do what a folder's journal says, as far as it is not done yet; the recordings that
+    changed."""
+    changed = []
+    for file, (before, after) in change.labels.items():
+        path = folder / file
+        way = [path, folder / DELETED / file]
+        source, goal = reversed(way) if before is None else way
+        if not source.is_file():
+            continue
+        if before is None or after is None:
+            source.rename(goal)
+            changed.append(path)
+            continue
+        recording = load(path)
+        if recording.labels != after:
+            save(path, replace(recording, meta={**recording.meta, "labels": after}))
+            changed.append(path)
+    if change.undo:
+        (folder / UNDO).unlink(missing_ok=True)
+        (folder / JOURNAL).unlink()
+    else:
+        (folder / JOURNAL).replace(folder / UNDO)
+    return changed
+
+
+def _begin(changes: Mapping[Path, Change]) -> list[Path]:
+    """Note what changes in each folder, and carry it out; the recordings that changed."""
+    number = os.urandom(8).hex()
+    folders = list(changes)
+    for folder in reversed(folders):
+        names = ["." if place == folder else str(place) for place in folders]
+        change = replace(changes[folder], number=number, folders=names)
+        with write_whole(folder / JOURNAL) as file:
+            file.write(json.dumps(vars(change)).encode())
+    return _finish(folders[0])
+
+
+def change_all(changes: Mapping[Path, Labels | None]) -> None:
+    """Give recordings new labels, or delete those that get None: all of them, or a later
+    start does.
+
+    Call it in a block of `alone`.
+
+    Raises:
+        InputError: a recording cannot be read or written.
+    """
+    of_folder: dict[Path, Change] = {}
+    for path in changes:
+        change = of_folder.setdefault(path.parent.absolute(), Change())
+        change.labels[path.name] = load(path).labels, changes[path]
+    for folder in of_folder:
+        with refusing(f"{folder}: its recordings cannot be changed"):
+            (folder / UNDO).unlink(missing_ok=True)
+            shutil.rmtree(folder / DELETED, ignore_errors=True)
+            if None in changes.values():
+                (folder / DELETED).mkdir()
+    _begin(of_folder)
+
+
+def take_back(folders: Iterable[Path]) -> list[Path]:
+    """Take the last change in each folder back; the recordings that changed.
+
+    Call it in a block of `alone`.
+
+    Raises:
+        InputError: by now, another recording has the name of a deleted one.
+    """
+    back: dict[Path, Change] = {}
+    for folder in map(Path.absolute, folders):
+        change = _noted(folder, UNDO)
+        if change is None:
+            continue
+        for file, (_, after) in change.labels.items():
+            if after is None and (folder / file).exists():
+                raise InputError(
+                    f"{folder / file}: exists again; rename it, and undo then"
+                )
+        labels = {file: pair[::-1] for file, pair in change.labels.items()}
+        back[folder] = replace(change, labels=labels, undo=True)
+    return _begin(back) if back else []

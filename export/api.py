@@ -50,6 +50,8 @@ def save(path: str | os.PathLike[str], fitted: Fitted, name: str | None = None) 
     target = Path(path)
     with write_whole(target) as file:
         file.write(data)
+        file.flush()
+        Model(file.name)  # one that cannot be read leaves the former one in its place
     golden.write(
         target.with_name("golden.npz"),
         Model(target),

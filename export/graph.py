@@ -9,6 +9,7 @@ finite with label -1.
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -28,6 +29,8 @@ from train.model.pipeline import ContactClassifier, FittedSpace, nearest_of_labe
 from train.model.stopping import SequentialClassifier
 
 IR_VERSION = 8
+DIGEST = b"rX\n\x14edge-classify-digest\x12@"
+"""Begins the field of the digest in a ModelProto: an entry of metadata of 64 digits."""
 LARGEST = float(np.finfo(np.float64).max)
 Fitted = ContactClassifier | SequentialClassifier
 
@@ -391,4 +394,10 @@ def to_onnx(model: Fitted, info: ModelInfo) -> bytes:
     onnx.checker.check_model(proto, full_check=True)
     data: bytes = proto.SerializeToString(deterministic=True)
     onnx_file.check(onnx_file.read(data, "the exported model"), "the exported model")
-    return data
+    return with_digest(data)
+
+
+def with_digest(data: bytes) -> bytes:
+    """A model's bytes, and after them the digest by which a change is noticed."""
+    with_key = data + DIGEST
+    return with_key + hashlib.sha256(with_key).hexdigest().encode()

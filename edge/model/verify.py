@@ -26,6 +26,7 @@ import os
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from itertools import chain, pairwise, starmap
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -70,6 +71,11 @@ class Check:
     def passed(self) -> bool:
         """Whether all rows are equal."""
         return self.row is None
+
+
+def golden_of(model: str | Path, version: str) -> Path:
+    """The golden file of an installed model, beside it."""
+    return Path(model).with_name(f"golden-{version}.npz")
 
 
 def first_series(

@@ -14,6 +14,7 @@ from edge.commands.texts import wrapped
 from edge.model.info import ModelInfo
 from edge.model.metadata import to_json
 from edge.model.model import Model
+from edge.model.onnx_file import DIGITS
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
@@ -36,6 +37,7 @@ def described(model: Model) -> dict[str, Any]:
         "file": model.path,
         "version": model.version,
         "bytes": len(model.contents.data),
+        "digest": model.contents.data[-DIGITS:].isalnum(),
         **json.loads(to_json(model.info)),
     }
 
@@ -63,6 +65,11 @@ def description(info: ModelInfo, about: dict[str, Any]) -> str:
         lines.append(f"With --error, it may decide at {points} s.")
     for sentence in _origin(info):
         lines += wrapped(sentence)
+    if not about["digest"]:
+        lines += wrapped(
+            "It has no digest, as it was made by an earlier version: damage to the file "
+            "may go unnoticed."
+        )
     return "\n".join(lines)
 
 

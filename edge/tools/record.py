@@ -33,11 +33,10 @@ from edge.files import refusing
 from edge.model.model import Model
 from edge.output.event_writer import Lines
 from edge.recording import Recording
-from edge.saving import save
+from edge.saving import DELETED, save
 from edge.skin import file as skinfile
 from edge.skin.file import SkinFile
 from edge.skin.skin import Skin
-from edge.tools.label import DELETED
 from edge.tools.review import decisions_of
 from edge.tools.trial_options import add_arm, open_arm, task_label
 from edge.touch.arm import Chain

@@ -21,6 +21,7 @@ from edge.commands.calibrate import (
 from edge.commands.options import NOISE_COUNTS
 from edge.skin import file as skinfile
 from edge.skin.decoder import dead_band
+from tests.edge.test_writing import left_by_a_dead_run
 
 
 def test_a_taxel_is_noisy_beyond_the_limit_and_not_at_it():
@@ -49,9 +50,11 @@ def test_the_fakes_rest_values_are_measured_and_the_old_file_is_kept(
     quiet,
     measured,
 ):
+    leftover = left_by_a_dead_run(skin.parent)
     before = skin.read_text()
     status, event, _ = measured(quiet)
     assert status == 0
+    assert not leftover.exists()
     assert event["frames"] == 30
     assert event["kept"] == 0
     assert Path(event["backup"]).read_text() == before

@@ -17,6 +17,7 @@ from edge.model.info import FORMAT, METADATA_KEY
 from edge.model.metadata import to_json
 from edge.model.metadata_reader import from_json
 from edge.model.model import Model
+from tests.conftest import sealed
 
 
 @pytest.fixture(scope="module")
@@ -32,10 +33,19 @@ def altered(exported, tmp_path):
         proto = onnx.load(exported / "model.onnx")
         change(proto)
         path = tmp_path / "altered.onnx"
-        path.write_bytes(proto.SerializeToString())
+        path.write_bytes(sealed(proto))
         return path
 
     return write
+
+
+def test_a_byte_that_changed_since_the_export_is_noticed(exported, tmp_path):
+    data = bytearray((exported / "model.onnx").read_bytes())
+    path = tmp_path / "damaged.onnx"
+    for place in np.linspace(0, len(data) - 65, 20).astype(int):
+        path.write_bytes(bytes([*data[:place], data[place] ^ 16, *data[place + 1 :]]))
+        with pytest.raises(InputError, match="changed or damaged since its export"):
+            Model(path)
 
 
 def test_metadata_says_what_the_board_needs(model, forearm):

@@ -1,7 +1,10 @@
 """`edge-classify info`: what a model says of itself."""
 
+import pytest
+
 from edge import demo
 from edge.model.model import Model
+from edge.tools.info import described, description
 
 INFO = Model(demo.MODEL).info
 
@@ -24,3 +27,9 @@ def test_a_person_gets_sentences(edge, monkeypatch):
     assert "Skin: 16 x 24 taxels, closed around" in out
     assert f"Fitted on {INFO.rows} trials" in out
     assert max(map(len, out.splitlines())) <= 80
+
+
+@pytest.mark.parametrize("digest", [True, False])
+def test_a_model_without_a_digest_is_said_to_have_none(digest):
+    about = {**described(Model(demo.MODEL)), "digest": digest}
+    assert ("It has no digest" in description(INFO, about)) != digest

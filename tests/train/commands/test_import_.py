@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from edge.recording import load
+from tests.edge.test_writing import left_by_a_dead_run
 from tests.train.importers.test_csv import write_frames
 from train.__main__ import main
 from train.commands.import_ import zeroed
@@ -42,7 +43,9 @@ def test_data_without_thresholds_get_those_of_their_noise(make_touch, tmp_path, 
             np.maximum(touch.frames, noise),
         )
     words = ["import", "csv", str(tmp_path / "csv"), "--frames", "--out"]
+    leftover = left_by_a_dead_run(tmp_path / "out")
     assert main([*words, str(tmp_path / "out")]) == 0
+    assert not leftover.exists()
     assert (
         "threshold 80 and onset 120 counts, from the noise before contact: 2 of 2 have "
         "a" in (capsys.readouterr().out)
