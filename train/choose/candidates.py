@@ -50,9 +50,6 @@ WITH_SHEAR = (
 """Those that recordings of a skin of three axes have besides, with or without joint
 angles."""
 EARLY_WITH_JOINTS = (
-    ("contact", "joints"),
-    ("moments", "joints"),
-    ("contact", "moments", "joints"),
     ("contact", "sqrt_joints"),
     ("sqrt_joints",),
 )

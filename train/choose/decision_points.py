@@ -7,7 +7,7 @@ from train.choose.options import FitOptions
 from train.choose.settings import Settings
 from train.data.dataset import DataSet
 from train.model.novelty import MOST_COMPONENTS
-from train.model.pipeline import Choices
+from train.model.pipeline import Choices, Space
 from train.model.stopping import FEWEST
 
 STEPS_S = (0.1, 0.2, 0.3, 0.4, 0.6)
@@ -116,17 +116,22 @@ def _bytes_of(choices: Choices, dataset: DataSet, samples: int) -> int:
     """Bytes of the constants that project and compare at a decision point.
 
     A column has a mean, a gain, and a weight for each coordinate; a trial its
-    coordinates and their length.
+    coordinates and their length. Tasks may share a space.
     """
     widths = dict(zip(dataset.names, dataset.widths(samples), strict=True))
     trials = len(dataset.trials)
-    size = 0
+    sizes: dict[Space, int] = {}
     for task, choice in choices.items():
         columns = sum(widths[name] for name in choice.features)
-        classes = len(set(dataset.labels(task).tolist()))
-        components = min(choice.components, 2 * classes, trials)
-        size += columns * (16 + 4 * components) + trials * (8 + 4 * components)
-    return size
+        components = choice.components
+        if choice.projection == "lda":
+            targets = choice.targets or (task,)
+            components = sum(len(set(dataset.labels(t).tolist())) - 1 for t in targets)
+        components = min(components, trials)
+        size = columns * (16 + 4 * components) + trials * (8 + 4 * components)
+        space = choice.space(task)
+        sizes[space] = max(sizes.get(space, 0), size)
+    return sum(sizes.values())
 
 
 def _rising(step_s: float, window_s: float) -> list[float]:

@@ -34,7 +34,7 @@ def test_a_model_has_the_decision_points_that_keep_it_small(
         labels=lambda task: labels,
     )
     data.of = lambda names: data
-    choice = Choice("IV", components, 3, features=("max_force",))
+    choice = Choice("IV", components, 3, "lda", features=("max_force",))
     settings = Settings(
         chosen={"object": SimpleNamespace(choice=choice)},
         folds=np.zeros(trials),
