@@ -35,7 +35,9 @@ def policies(model: Model, error: float) -> Mapping[str, Policy]:
         if rule is None:
             policy_of[task] = Uncertified(model.info)
         else:
-            kind = Product if task in model.info.products else Early
+            # At a fixed window a product needs no answers of its factors.
+            waits = task in model.info.products and not rule.fixed
+            kind = Product if waits else Early
             policy_of[task] = kind(model.info, task, rule, error)
     return policy_of
 

@@ -161,9 +161,7 @@ class Stopping:
         slope, intercept, doubt: the same of all decision points together, for the
             rules. A point's own curve seldom rises high early, so with it the rules
             would wait on clear contacts too.
-        rules: in the order of rising error. Mean times fall along them, except from a
-            factor's own rules to those that it shares with its product (see
-            `edge.model.agreement`).
+        rules: in the order of rising error. Mean times never rise along them.
         trials: number of trials that certify the rules.
         wrong: number of these trials that are decided wrongly at the full window.
         risk: probability that a rule errs more often than its certificate says.

@@ -61,9 +61,6 @@ OF_JOINTS = (("joints",), ("joints", "posture"))
 """For known things, each of `OF_SKIN` is a candidate with each of these, and with shear
 and without, where the recordings have them."""
 EARLY_WITH_JOINTS = (
-    ("contact", "joints"),
-    ("moments", "joints"),
-    ("contact", "moments", "joints"),
     ("contact", "sqrt_joints"),
     ("sqrt_joints",),
 )

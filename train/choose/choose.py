@@ -9,12 +9,12 @@ from functools import partial
 import numpy as np
 
 from edge.arrays import Booleans, Floats, Integers
-from train.choose.candidates import Candidate, features_of
+from train.choose.candidates import Candidate
+from train.choose.early import by_folds, early_options, points_of, settle_early
 from train.choose.evaluate import (
     AnswerTable,
     Promise,
     Result,
-    averaged,
     evaluate,
     fits,
 )
@@ -32,9 +32,6 @@ from train.model.pipeline import Choice, Choices
 from train.model.stopping import Early
 from train.progress import bar
 
-EARLY_SHARES = (0.25, 0.5, 0.75)
-"""Parts of the full window at which the settings of the earlier decision points are
-chosen, by the mean of their accuracies."""
 UNSEEN_SHRINKAGE = 0.1
 """Smallest shrinkage tried where entire groups are left out. Less shrinkage relies on
 differences that are small beside the features' spread, which do not carry over to new
@@ -101,8 +98,6 @@ class Choosing:
         what: str,
         *,
         nested: bool,
-        repeated: bool = True,
-        halve: bool = True,
     ) -> tuple[AnswerTable, AnswerTable]:
         """The candidates' answers to left-out trials, and to left-out groups where
         there are any, each of the tasks that are chosen by them.
@@ -110,7 +105,7 @@ class Choosing:
         Without groups, both are the answers to left-out trials.
         """
         folds = self._divisions.folds
-        further_folds = self._divisions.further if repeated else ()
+        further_folds = self._divisions.further
         grouped = [task for task in self._y if self._is_grouped(task)]
         by_trial = for_tasks(candidates, {*self._y}.difference(grouped))
         total = fits(folds, nested)
@@ -129,7 +124,7 @@ class Choosing:
                 vectors,
                 jobs=self._jobs,
                 progress=progress.update,
-                halve=halve,
+                halve=True,
             )
             trials = answers(folds, by_trial, nested=nested)
             further = [
@@ -219,11 +214,11 @@ class Choosing:
         for task in self._y:
             protocol = self._protocol(task, trials, groups)
             chosen[task], of_task[task] = self._settle(task, protocol, trials)
-        without = _by_fold(of_task)
+        without = by_folds(of_task)
         plans: dict[str, Plan] = {TRIAL: (trials.folds, without)}
         if groups is not None:
             by_group = {task: groups.by_fold(task) for task in groups.table.right}
-            plans[groups.name] = groups.folds, _by_fold(by_group)
+            plans[groups.name] = groups.folds, by_folds(by_group)
         together = decided_together(chosen, vectors, plans, self._jobs)
         return Settings(together, trials.folds, without, self.candidates, window_s, [])
 
@@ -252,31 +247,23 @@ class Choosing:
         window_s: float,
         chosen: Mapping[str, Chosen],
     ) -> Early | None:
-        """The settings of the decision points before the full window, by the same rule
-        as those of the full window; None without candidates for them."""
-        if not self._early_candidates:
+        """The settings of the decision points before the full window; None without
+        candidates for them."""
+        full = {task: settings.choice for task, settings in chosen.items()}
+        options = early_options(self._early_candidates, full)
+        if not options:
             return None
-        tables = [self._early_tables(share * window_s) for share in EARLY_SHARES]
-        trials, groups = self._protocols(*map(averaged, zip(*tables, strict=True)))
+        choices = [choice for option in (full, *options) for choice in option.values()]
+        names = {name for choice in choices for name in choice.features}
+        dataset = self._dataset.of(sorted(names)).with_kernels(window_s)
+        at_points = [
+            dataset.features(seconds, self._samples)
+            for seconds in points_of(window_s).tolist()
+        ]
+        widths = dataset.widths(self._samples)
+        vectors = Vectors(np.stack(at_points), self._y, dataset.names, widths)
         folds = self._divisions.folds
-        settled = {}
-        for task in self._y:
-            # The graph has one number of neighbours for all decision points.
-            k = chosen[task].choice.k
-            protocol = self._protocol(task, trials, groups)
-            settled[task] = protocol.with_neighbours(task, k, folds)
-        choices, *by_fold = _by_fold(settled)
-        return Early(window_s, choices, by_fold)
-
-    def _early_tables(self, window_s: float) -> tuple[AnswerTable, AnswerTable]:
-        """The answers of the candidates for early decision points at one of them."""
-        candidates = self._early_candidates
-        dataset = self._dataset.of(features_of(candidates))
-        vectors = dataset.vectors(window_s, self._samples, self._y)
-        what = f"{window_s:g} s"
-        # A candidate counts by its mean over several windows, so none is dropped.
-        once = {"nested": False, "repeated": False, "halve": False}
-        return self._tables(vectors, candidates, what, **once)
+        return settle_early(vectors, window_s, full, options, folds, self._jobs)
 
     def _settle(
         self,
@@ -340,12 +327,6 @@ def for_tasks(
             if served:
                 limited.append(replace(grid, tasks=served))
     return limited
-
-
-def _by_fold(choices: Mapping[str, Sequence[Choice]]) -> list[dict[str, Choice]]:
-    """[fold]{task: its choice} from {task: [fold] its choice}."""
-    folds = zip(*choices.values(), strict=True)
-    return [dict(zip(choices, of_fold, strict=True)) for of_fold in folds]
 
 
 def decided_together(

@@ -111,7 +111,7 @@ class AnswerTable:
         choices: {task: the candidates}.
         right: {task: (folds, candidates, n)} whether the fit without a fold, and
             without the trial's own fold, answers the trial rightly; True for trials
-            that are not tested. In an `averaged` table, the share of right answers.
+            that are not tested.
         tested: {task: (n,) whether a trial has a label and a fold}; all where a task
             has no entry.
         repeated: tables of the same candidates by other folds, whose answers to
@@ -245,16 +245,6 @@ def nested_accuracy(
 ) -> Result:
     """The accuracy of the choice itself, with the numbers that it most often takes."""
     return table.answered(task, chosen_by_fold(table, task, rule))
-
-
-def averaged(tables: Sequence[AnswerTable]) -> AnswerTable:
-    """A table with the mean share of right answers of several, of the same candidates
-    and folds."""
-    first = tables[0]
-    right = {}
-    for task in first.right:
-        right[task] = np.mean([table.right[task] for table in tables], axis=0)
-    return replace(first, right=right)
 
 
 def fold_numbers(folds: Integers) -> range:

@@ -6,8 +6,6 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
-import numpy as np
-
 from edge.arrays import Integers
 from train.choose.candidates import Candidate, costs, places_of
 from train.choose.evaluate import (
@@ -79,15 +77,6 @@ class TrialsLeftOut:
         """[fold] a task's settings chosen without the trials of one of the folds (n,)
         of single trials."""
         return self.by_fold(task)
-
-    def with_neighbours(self, task: str, k: int, folds: Integers) -> list[Choice]:
-        """A task's settings of k neighbours, and those chosen without each of the folds
-        (n,) of single trials."""
-        choices = self.table.choices[task]
-        allowed = np.flatnonzero([choice.k == k for choice in choices])
-        rule = replace(self.rule(task), allowed=allowed)
-        others = chosen_by_other_fold(self.table, task, folds, rule)
-        return [choices[i] for i in (chosen(self.table, task, rule), *others)]
 
     def accuracy(self, task: str) -> Result:
         """The nested accuracy of the choice."""

@@ -1,7 +1,6 @@
 """The choice of settings and of the window."""
 
 from dataclasses import replace
-from itertools import product
 from types import SimpleNamespace
 
 import numpy as np
@@ -10,49 +9,16 @@ import pytest
 import train
 from edge.saving import save
 from edge.statistics import wilson
-from train.choose.candidates import candidates, features_of
 from train.choose.choose import Choosing, decided_together
 from train.choose.evaluate import AnswerTable, Promise
 from train.choose.protocols import GroupsLeftOut, TrialsLeftOut
 from train.choose.settings import Chosen
-from train.data.dataset import Measurement, load_trials
-from train.data.feature_sets import expand
 from train.data.groups import Divisions, Groups
 from train.data.parts import part
 from train.data.vectors import Vectors
 from train.model.pipeline import Choice, ContactClassifier, vote
 
-EARLY = ("contact", "contact joints", "sqrt_joints")
 TWO = ("max_force", "contact_area")
-
-
-def early_settings(make_touch, folder, arm, k):
-    """The settings before the full window, where those of the full window take k
-    neighbours."""
-    for kind, seed in product(("hard", "soft"), range(6)):
-        touch = make_touch(kind=kind, seed=seed, arm=arm, labels={"softness": kind})
-        save(folder / f"{kind}-{seed}.npz", touch)
-    early = [c for c in candidates({}, joints=arm) if c.name in EARLY]
-    dataset = load_trials([folder], Measurement(features_of(early)))
-    y = {"softness": dataset.labels("softness")}
-    choosing = Choosing(dataset, y, early, Divisions.of(dataset, y), samples=40)
-    chosen = {"softness": SimpleNamespace(choice=Choice("IV", 1, k))}
-    return choosing.early(1.2, chosen)
-
-
-def test_decision_points_before_the_full_window_have_settings_where_joints_are_known(
-    make_touch, tmp_path
-):
-    early = early_settings(make_touch, tmp_path, arm=True, k=3)
-    assert early.until_s == 1.2
-    assert early.choices["softness"].features == expand(["contact", "joints"])
-    assert len(early.by_fold) == 10
-    # The number of neighbours is that of the full window, as the graph has one.
-    assert {c["softness"].k for c in (early.choices, *early.by_fold)} == {3}
-
-
-def test_without_joints_they_have_the_settings_of_the_full_window(make_touch, tmp_path):
-    assert early_settings(make_touch, tmp_path, arm=False, k=3) is None
 
 
 @pytest.fixture

@@ -13,7 +13,6 @@ from train.choose.evaluate import (
     AnswerTable,
     Promise,
     Result,
-    averaged,
     chosen,
     chosen_by_fold,
     evaluate,
@@ -180,18 +179,6 @@ def test_further_divisions_count_in_the_choice_by_all_trials_alone():
     assert chosen(repeated_table, "t") == 1
     assert chosen_by_fold(repeated_table, "t") == [0, 0]
     assert chosen_by_fold(table(first), "t") == [0, 0]
-
-
-def test_the_choice_of_several_windows_is_by_the_mean_of_their_answers():
-    right = np.array([[True, True, True, False], [True, True, False, False]])
-    folds = np.arange(4) % 2
-    settings = {"t": [Choice("IV", 1, 1), Choice("IV", 1, 3)]}
-    tables = [
-        AnswerTable(folds, settings, {"t": np.stack([window] * 2)})
-        for window in (right, ~right)
-    ]
-    mean = averaged([tables[0], tables[0], tables[1]])
-    assert mean.plain("t") == pytest.approx(np.array([[2, 2, 2, 1], [2, 2, 1, 1]]) / 3)
 
 
 def test_folds_spread_each_class_evenly():
