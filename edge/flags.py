@@ -14,7 +14,7 @@ FLAGS = {
     "frozen": "frames repeat bit for bit for twice as long",
     "speed": (
         "the arm came more slowly than in 99 % of the training trials, so that what it "
-        "would still have moved may be called fixed; or a quarter faster"
+        "would still have moved may be called fixed; or faster than in 99 %, by 15 %"
     ),
     "several": (
         "a second region beside the contact in a fifth of the window, as fewer than a "

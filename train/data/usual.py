@@ -19,12 +19,12 @@ OFTEN = 0.2
 """A second region is no doubt for a label if so many of its trials had one."""
 SELDOM = 0.01
 """Share of the trials that may lie outside of a usual range, on one side."""
-SLOWER = 0.98
+SLOWER = 0.97
 """Part of the least speed that is no doubt, as clocks and encoders err. At 0.9 of the
 speed, 4 % of the sure answers were wrong, as things had not moved yet."""
-FASTER = 1.25
-"""Part of the greatest speed that is no doubt: at 1.2 times the speed no more answers
-were wrong, at 1.3 times 4 % of the sure ones."""
+FASTER = 1.15
+"""Part of the greatest speed that is no doubt. At 1.1 times the speed no more answers
+were wrong, at 1.2 times 7 % of the sure objects."""
 
 
 def usual_touches(
