@@ -7,7 +7,7 @@ from edge.events import Decided
 from edge.model.info import NOVELTY_RATE, ModelInfo
 from edge.model.model import Decision, Model
 from edge.touch.contact import Contact, FeatureSeries
-from edge.touch.doubts import frame_doubts
+from edge.touch.doubts import frame_doubts, is_several
 
 
 def answers_about(
@@ -59,6 +59,8 @@ def answers_about(
 
             phrase = unusual(vector, info.widths, info.usual)
             answer = replace(answer, unusual=phrase)
+    if any(decision.label in info.several_labels for decision in decisions.values()):
+        answer = answer.flagged(several=False)
     return {
         task: _answer(replace(answer, task=task), decision, info)
         for task, decision in decisions.items()
@@ -72,9 +74,15 @@ def contact_doubts(
     window_s: float,
 ) -> dict[str, bool]:
     """{flag: whether it holds} for what was measured of a contact, see `edge.flags`."""
-    limits = () if info.chain is None else info.chain.limits
+    doubts = frame_doubts(series, window_s)
+    if info.joints:
+        from edge.touch.joint_doubts import joint_doubts  # not every model has joints
+
+        limits = () if info.chain is None else info.chain.limits
+        doubts |= joint_doubts(series, window_s, limits, info.still_s, info.speeds)
     return {
-        **frame_doubts(series, window_s, info.several, limits),
+        **doubts,
+        "several": is_several(series.felt(window_s)),
         "missing_taxels": contact.missing_taxels,
         "missing_pose": contact.missing_pose,
         "late": contact.late,

@@ -86,7 +86,9 @@ def _read(meta: ConfigTable) -> ModelInfo:
         name=meta.text("name", "", empty=True),
         trials=meta.texts("trials", ()),
         usual=_usual(meta, names),
-        several=meta.number("several", 1.0, low=0.0, high=1.0),
+        several_labels=meta.texts("several_labels", ()),
+        still_s=meta.numbers("still_s", default=()),
+        speeds=meta.numbers("speeds", 2) if meta.has("speeds") else (),
     )
     tracking.refuse_unknown()
     return info

@@ -198,6 +198,8 @@ class ContactTracker:
         if frame.t < self._t:
             raise InputError(f"time goes back from {self._t} to {frame.t} s")
         self._t = frame.t
+        if self._measurer.joints is not None:
+            self._measurer.joints.watch(frame)
 
 
 def active_taxels(

@@ -81,11 +81,26 @@ def test_a_model_that_cannot_be_run_is_an_error_and_no_flag(
         (lambda t: t, False),
         (lambda t: 1e3 * t, True),  # milliseconds
         (lambda t: np.where(t > 0.235, t + 5.0, t), True),
-        (lambda t: np.where(t > 0.5, t + 0.11, t), True),
-        (lambda t: np.where(t > 0.5, t + 0.08, t), False),
+        (lambda t: np.where(t > 0.5, t + 0.05, t), True),
+        (lambda t: np.where(t > 0.5, t + 0.03, t), False),
     ],
 )
 def test_a_gap_in_the_window_flags_the_decision(model, make_touch, damage, flagged):
     recording = make_touch()
     events = decided(model, replace(recording, t=damage(recording.t)))
     assert ["gap" in event.flags for event in events] == [flagged] * 2
+
+
+@pytest.mark.parametrize("label", ["soft 0", "none"])
+def test_a_second_region_is_a_doubt_unless_the_named_label_often_had_one(
+    exported,
+    make_touch,
+    label,
+):
+    model = Model(exported / "model.onnx")
+    model.info = replace(model.info, several_labels=(label,))
+    touch = make_touch(kind="soft", seed=99)
+    touch.frames[:, :2, 12:14] = 2 * touch.frames.max(axis=(1, 2))[:, None, None] // 3
+    events = decided(model, touch)
+    assert [event.label for event in events] == ["soft-fixed", "soft 0"]
+    assert ["several" in event.flags for event in events] == [label == "none"] * 2
