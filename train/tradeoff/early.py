@@ -211,7 +211,7 @@ def _joined(courses: Sequence[Course]) -> Course:
     return Course(
         confidences=list(map(np.hstack, confidences)),
         wrong=list(map(np.hstack, wrong)),
-        unknown=np.hstack([course.unknown for course in courses]),
+        unusual=np.hstack([course.unusual for course in courses]),
     )
 
 
@@ -228,7 +228,9 @@ def _certified(
     for course, rule in folds:
         at, wrong = course.under(rule)
         _, late = course.under(waiting)
-        unknown = course.unknown[at, np.arange(len(at))] & course.withheld
+        unknown = np.zeros(len(at), dtype=bool)
+        if course.withheld is not None:
+            unknown = course.withheld[at, np.arange(len(at))]
         rows.append([~wrong, ~late, unknown, at < len(seconds) - 1, seconds[at]])
     decided, waited, *shares = map(np.concatenate, zip(*rows, strict=True))
     means = [float(share.mean()) for share in shares]

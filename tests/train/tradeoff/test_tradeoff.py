@@ -293,7 +293,7 @@ class TestEarly:
         rule = StoppingRule(0.1, 0.0, 0.5, 1)
         wrong = np.array([[True, False, False, False], [False] * 4])
         unknown = np.array([[False] * 4, [True, False, False, False]])
-        course = Course([np.full((2, 4), 0.5)], [wrong], unknown, withheld=True)
+        course = Course([np.full((2, 4), 0.5)], [wrong], unknown, withheld=unknown)
         decisions = early._certified(0.1, [(course, rule)], (0.6, 1.2))
         assert decisions.folds == 1
         assert decisions.result.right == 3
