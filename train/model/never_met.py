@@ -5,13 +5,11 @@ what was never met. So the trials of some things are scored, and answered, by fi
 without any trial of these things. Logistic regression then tells known from left-out
 things by remoteness (`train.model.novelty`), as if a share `SHARE` of all contacts were
 with the latter. The confidence of the task that names things is multiplied by this
-probability that the thing is known. So it is right where so many contacts are with
-things that were never met, and a little modest where none are.
+probability that the thing is known. Its curve is raised by as much, so that the mean
+confidence of known things stays right.
 """
 
 from __future__ import annotations
-
-from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.special import expit
@@ -23,7 +21,7 @@ from train.data.folds import group_folds
 from train.data.vectors import Strings
 from train.model.novelty import UNKNOWN_RATE, limits_of
 
-SHARE = 0.08
+SHARE = 0.05
 """Share of contacts with things that were never met."""
 FEWEST_THINGS = 5
 """Where there are fewer, what remains of a fold says little of the model."""
@@ -38,19 +36,6 @@ SURE = 0.9
 UNSURE = 0.5
 
 
-@dataclass(frozen=True)
-class Judged:
-    """What held-out contacts were given.
-
-    Attributes:
-        confidence: (decision points, n) of the task that names things, by its curves.
-        remoteness: (decision points, n).
-    """
-
-    confidence: Floats
-    remoteness: Floats
-
-
 def thing_folds(labels: Strings) -> Integers | None:
     """(n,) folds of entire things by their labels, -1 for trials without one; None
     where they are too few to leave any out."""
@@ -59,32 +44,32 @@ def thing_folds(labels: Strings) -> Integers | None:
     return np.where(labels == "", -1, group_folds(labels, MOST_FOLDS))
 
 
-def remoteness_of(task: str, known: Judged, left_out: Judged | None) -> Remoteness:
-    """The limits, the curves and the worth of remoteness.
+def remoteness_of(task: str, known: Floats, left_out: Floats | None) -> Remoteness:
+    """The limits and the curves of remoteness.
 
     Args:
         task: that names things.
-        known: contacts held out by themselves.
-        left_out: contacts with things that were left out; None where none could be.
+        known: (decision points, n) remoteness of contacts held out by themselves.
+        left_out: (decision points, m) of those with things that were left out; None
+            where none could be.
     """
-    typical, limits = limits_of(known.remoteness, UNKNOWN_RATE)
+    typical, limits = limits_of(known, UNKNOWN_RATE)
     if left_out is None:
         slopes = (USUAL_SLOPE,) * len(typical)
         middles = (USUAL_MIDDLE,) * len(typical)
-        return Remoteness(task, typical, limits, slopes, middles)
-    scores = known.remoteness, left_out.remoteness
-    slopes, middles = zip(*map(_curve, *scores, typical), strict=True)
-    remoteness = Remoteness(task, typical, limits, slopes, middles)
-    return replace(remoteness, worth=_worth(remoteness, known, left_out))
+    else:
+        curves = map(_curve, known, left_out, typical)
+        slopes, middles = zip(*curves, strict=True)
+    return Remoteness(task, typical, limits, slopes, middles)
 
 
-def discounted(remoteness: Remoteness, judged: Judged) -> Floats:
-    """(decision points, n) confidences as the board lowers them (see
-    `edge.model.info.Remoteness.known`)."""
+def known_of(remoteness: Remoteness, scores: Floats) -> Floats:
+    """(decision points, n) probabilities that things are known, as the board has them
+    (`edge.model.info.Remoteness.known`), from their remoteness."""
     columns = remoteness.typical, remoteness.slopes, remoteness.middles
     typical, slopes, middles = (np.array(column)[:, None] for column in columns)
-    logs = np.log(np.maximum(judged.remoteness, 1e-300) / np.maximum(typical, 1e-300))
-    return np.asarray(expit(slopes * (middles - logs)) * judged.confidence)
+    logs = np.log(np.maximum(scores, 1e-300) / np.maximum(typical, 1e-300))
+    return np.asarray(expit(slopes * (middles - logs)))
 
 
 def is_unknown(remoteness: Remoteness, scores: Floats) -> Booleans:
@@ -105,19 +90,22 @@ def _curve(known: Floats, left_out: Floats, typical: float) -> tuple[float, floa
     return slope, float(fitted.intercept_[0]) / slope
 
 
-def _worth(
-    remoteness: Remoteness,
-    known: Judged,
-    left_out: Judged,
+def worth_of(
+    known: Booleans, unknown: Booleans, confidence: Floats
 ) -> dict[str, float]:
-    """Shares of contacts at the full window: of known things that are called unknown;
-    of left-out ones that are, and that are named, `unsure` or `sure` as their
-    confidence is."""
-    of_known = is_unknown(remoteness, known.remoteness)[-1]
-    unknown = is_unknown(remoteness, left_out.remoteness)[-1]
-    confidence = discounted(remoteness, left_out)[-1]
+    """What the doubt is worth at the full window, as shares of contacts.
+
+    Args:
+        known: (n,) whether contacts with known things are called unknown.
+        unknown: (m,) whether those with left-out things are.
+        confidence: (m,) in the names of the latter.
+
+    Returns:
+        `known` and `unknown`: those called so; `unsure` and `sure`: left-out things
+        that are named with a low and with a high confidence.
+    """
     shares = {
-        "known": of_known,
+        "known": known,
         "unknown": unknown,
         "unsure": ~unknown & (confidence < UNSURE),
         "sure": ~unknown & (confidence > SURE),

@@ -34,22 +34,21 @@ import numpy as np
 
 from edge.arrays import Booleans, Floats, Integers
 from edge.errors import InputError
-from edge.model.info import Novelty, Remoteness, Stopping, StoppingRule
+from edge.model.info import Novelty, Stopping, StoppingRule
 from edge.touch.features import FEATURES
 from train.data.folds import finest, stratified_folds
 from train.data.vectors import Strings, Vectors
 from train.model.curves import Curve, cross_fitted
 from train.model.held_out import AtPoints, HeldOut, answers, held_out
 from train.model.never_met import (
-    Judged,
-    discounted,
     is_unknown,
+    known_of,
     remoteness_of,
     thing_folds,
+    worth_of,
 )
 from train.model.novelty import (
     FOLDS,
-    UNKNOWN_RATE,
     UNUSUAL_RATE,
     NoveltySpace,
     held_out_scores,
@@ -179,7 +178,7 @@ class SequentialClassifier:
         self.stopping_ = self._with_curves(
             self._certified(chosen_without), chosen_by_all
         )
-        self.remoteness_ = self._remoteness(of_model, chosen_by_all)
+        self.remoteness_ = replace(self._bare, worth=self._worth(of_model))
         return self
 
     @property
@@ -237,35 +236,36 @@ class SequentialClassifier:
         tested = scores.part(folds >= 0)
         self.novelty_ = Novelty(*limits_of(tested.novelty, UNUSUAL_RATE))
         self._excess = excess_of(self.novelty_, scores.novelty)
-        self._remote = scores.remoteness
+        self._things = thing_folds(np.where(folds >= 0, labels, ""))
+        left_out = None
+        if self._things is not None:
+            of_vectors = vectors.X, labels, self._things, vectors.columns
+            self._left_out = held_out_scores(*of_vectors, self.jobs)
+            left_out = self._left_out.part(self._things >= 0).remoteness
+        self._bare = remoteness_of(self._name, tested.remoteness, left_out)
+        self._known = known_of(self._bare, scores.remoteness)
         self.unusual_ = is_unusual(self.novelty_, scores.novelty)
-        _, limits = limits_of(tested.remoteness, UNKNOWN_RATE)
-        self.unknown_ = scores.remoteness > np.array(limits)[:, None]
+        self.unknown_ = is_unknown(self._bare, scores.remoteness)
 
-    def _remoteness(self, vectors: Vectors, answered: HeldOut) -> Remoteness:
-        """The limits and curves of remoteness, by trials and by things that were left
-        out; the vectors are those that the model takes."""
+    def _worth(self, vectors: Vectors) -> dict[str, float]:
+        """What the doubt about names is worth, by answers to things that were left out;
+        empty where none could be. The vectors are those that the model takes."""
+        things = self._things
+        if things is None:
+            return {}
         task = self._name
-        tested = self._tested[task]
-        margins = answered.margins[task][:, tested]
-        confidence = self._confidence(task, margins, self._excess[:, tested])
-        known = Judged(confidence, self._remote[:, tested])
-        folds = thing_folds(np.where(tested, vectors.y[task], ""))
-        if folds is None:
-            return remoteness_of(task, known, None)
-        labels = vectors.y[task]
-        of_vectors = vectors.X, labels, folds, vectors.columns
-        scores = held_out_scores(*of_vectors, self.jobs).part(tested)
-        deciding = (task, *self.products_.get(task, ()))
-        choices = {t: self.choices[t] for t in deciding}
+        choices = {t: self.choices[t] for t in (task, *self.products_.get(task, ()))}
         at_end = replace(vectors, X=vectors.X[-1:])
-        count = int(folds.max()) + 1
-        (named,) = held_out(at_end, folds, [[[choices]] * count], self.jobs)
+        count = int(things.max()) + 1
+        (named,) = held_out(at_end, things, [[[choices]] * count], self.jobs)
+        scores = self._left_out.part(things >= 0)
+        margins = named.margins[task][:, things >= 0]
         excess = excess_of(self.novelty_, scores.novelty)
-        margins = np.tile(named.margins[task][:, tested], (len(excess), 1))
-        confidence = self._confidence(task, margins, excess)
-        left_out = Judged(confidence, scores.remoteness)
-        return remoteness_of(task, known, left_out)
+        curves = self._confidence(task, np.tile(margins, (len(excess), 1)), excess)
+        confidence = curves * known_of(self._bare, scores.remoteness)
+        unknown = is_unknown(self._bare, scores.remoteness)
+        known = self.unknown_[-1, self._folds >= 0]
+        return worth_of(known, unknown[-1], confidence[-1])
 
     def _confidence(self, task: str, margins: Floats, excess: Floats) -> Floats:
         """(points, m) confidences by a task's curve of each decision point."""
@@ -318,7 +318,10 @@ class SequentialClassifier:
                 self.right_[task][:, tests],
             )
             together = _curve(*evidence)
-            curves = map(_curve, *evidence)
+            known = self._known[:, tests]
+            if task != self._name:
+                known = np.ones_like(known)
+            curves = map(_curve, *evidence, known)
             slopes, intercepts, doubts = zip(*map(astuple, curves), strict=True)
             stopping[task] = Stopping(
                 slopes=slopes,
@@ -364,9 +367,7 @@ class SequentialClassifier:
             pooled = Curve(stopping.slope, stopping.intercept, stopping.doubt)
             together[task] = pooled.probabilities(margins, excess)
             confidence[task] = self._confidence(task, margins, excess)
-        name = self._name
-        of_name = Judged(confidence[name], scores.remoteness)
-        confidence[name] = discounted(self.remoteness_, of_name)
+        confidence[self._name] *= known_of(self.remoteness_, scores.remoteness)
         unusual = is_unusual(self.novelty_, scores.novelty)
         doubts = unusual, is_unknown(self.remoteness_, scores.remoteness)
         tested = {task: y[task] != "" for task in right}
@@ -402,7 +403,9 @@ def _curve(
     excess: Floats,
     right: Booleans,
     honest: Booleans,
+    known: Floats | float = 1.0,
 ) -> Curve:
-    """The curve of answers, with the mean probability of honest ones."""
+    """The curve of answers, with the mean probability of honest ones, each times that
+    of `known`."""
     share = float(honest.mean())
-    return Curve.of(margins, excess, right).with_mean(margins, excess, share)
+    return Curve.of(margins, excess, right).with_mean(margins, excess, share, known)
