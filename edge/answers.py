@@ -4,7 +4,7 @@ from dataclasses import replace
 
 from edge.errors import OutOfRange
 from edge.events import Decided
-from edge.model.info import NOVELTY_RATE, ModelInfo
+from edge.model.info import ModelInfo
 from edge.model.model import Decision, Model
 from edge.touch.contact import Contact, FeatureSeries
 from edge.touch.doubts import frame_doubts, is_several
@@ -50,21 +50,27 @@ def answers_about(
     except OutOfRange:
         answer = answer.flagged(out_of_range=True)
         return {task: replace(answer, task=task) for task in info.tasks}
-    if info.novelty is not None:
-        score = decisions[info.novelty.task].novelty
-        unknown = info.novelty.rate(point, score) <= NOVELTY_RATE
-        answer = answer.flagged(unknown=unknown)
-        if unknown and window_s == info.window_s:
-            from edge.model.unusual import unusual  # few contacts are unknown
-
-            phrase = unusual(vector, info.widths, info.usual)
-            answer = replace(answer, unusual=phrase)
     if any(decision.label in info.several_labels for decision in decisions.values()):
         answer = answer.flagged(several=False)
-    return {
+    answers = {
         task: _answer(replace(answer, task=task), decision, info)
         for task, decision in decisions.items()
     }
+    if info.novelty is not None and info.remoteness is not None:
+        name = info.remoteness.task
+        asked = decisions[name]
+        if asked.remoteness > info.remoteness.limits[point]:
+            answers[name] = answers[name].withheld()
+        if asked.novelty > info.novelty.limits[point]:
+            from edge.model.unusual import unusual  # few contacts are unusual
+
+            is_full = window_s == info.window_s
+            phrase = unusual(vector, info.widths, info.usual) if is_full else None
+            answers = {
+                task: replace(answer, unusual=phrase).flagged(unusual=True)
+                for task, answer in answers.items()
+            }
+    return answers
 
 
 def contact_doubts(

@@ -11,7 +11,6 @@ from edge.errors import InputError
 from edge.events import Decided
 from edge.model.agreement import product_label
 from edge.model.info import (
-    UNKNOWN,
     ModelInfo,
     Stopping,
     StoppingRule,
@@ -95,7 +94,6 @@ class Early:
         self._rule = rule
         self._error = error
         self._stopping = info.stopping[task]
-        self._names_unknown = info.novelty is not None and info.novelty.task == task
 
     def answer(
         self,
@@ -105,19 +103,19 @@ class Early:
     ) -> Decided | None:
         """The answer at a decision point; None if the task goes on waiting.
 
-        An unknown contact waits for the full window.
+        An unusual contact waits for the full window.
 
         Args:
             candidate: the model's answer.
             point: index of the decision point.
             decided: the answers to the contact's other tasks so far.
         """
-        unknown = UNKNOWN in candidate.flags
+        waits = "unusual" in candidate.flags
         sure = self._is_sure(candidate, point)
-        last = len(self._info.decision_points_s) - 1 if unknown else self._rule.last
-        if point < last and (unknown or not sure):
+        last = len(self._info.decision_points_s) - 1 if waits else self._rule.last
+        if point < last and (waits or not sure):
             return None
-        return self._answered(candidate, point, sure)
+        return self._answered(candidate, sure)
 
     def _is_sure(self, candidate: Decided, point: int) -> bool:
         decision = _decision(candidate)
@@ -131,17 +129,9 @@ class Early:
         distances = decision.label_distances.tolist()
         return is_sure(self._stopping, self._rule, distances, label, excess)
 
-    def _answered(self, candidate: Decided, point: int, sure: bool) -> Decided:
+    def _answered(self, candidate: Decided, sure: bool) -> Decided:
         """The answer of the rule."""
-        novelty = self._info.novelty
-        if UNKNOWN in candidate.flags and self._names_unknown and novelty is not None:
-            rate = novelty.rate(point, _decision(candidate).novelty)
-            candidate = replace(
-                candidate,
-                label=UNKNOWN,
-                confidence=round(1.0 - rate, 6),
-            )
-        elif not sure and not self._rule.fixed:
+        if candidate.label is not None and not sure and not self._rule.fixed:
             candidate = candidate.flagged(unsure=True)
         stopped_by = "confidence" if sure else "window"
         answer = replace(candidate, error=self._error, stopped_by=stopped_by)
@@ -149,7 +139,8 @@ class Early:
 
 
 class Product(Early):
-    """Decide when both factors are, by their labels."""
+    """Decide when both factors are, by their labels. A pair that was never met has no
+    name."""
 
     def answer(
         self,
@@ -170,7 +161,10 @@ class Product(Early):
             indices[factor] = labels.index(str(answer.label))
             confidence *= answer.confidence or 0.0
             sure = sure and answer.stopped_by == "confidence"
-        label = self._task.labels[product_label(factors, indices)]
+        index = product_label(factors, indices)
+        if index is None or candidate.label is None:
+            return self._answered(candidate.withheld(), sure)
+        label = self._task.labels[index]
         decision = _decision(candidate)._replace(label=label)
         confidence = round(confidence, 6)
         candidate = replace(
@@ -179,7 +173,7 @@ class Product(Early):
             confidence=confidence,
             decision=decision,
         )
-        return self._answered(candidate, point, sure)
+        return self._answered(candidate, sure)
 
 
 Policy = Uncertified | Early

@@ -45,8 +45,8 @@ class Decided:
 
     Attributes:
         task: the question.
-        label: its answer; "unknown" if no trained label fits, None if the features are
-            too large to be compared with the training rows.
+        label: its answer; None if the thing is unknown, or the features are too large
+            to be compared with the training rows.
         confidence: the calibrated probability that the label is right, 0 to 1; None
             of a model without calibration.
         window_s: seconds from onset on which the decision is based.
@@ -62,7 +62,7 @@ class Decided:
         model: name and version of the model, if it has a name.
         strongest: without a contact, the largest count of any taxel, as a part of the
             count at which a contact begins; else None.
-        unusual: of an unknown contact, what is most unlike training, as a phrase.
+        unusual: of an unusual contact, what is most unlike training, as a phrase.
         nearest: names of the nearest training trials, which voted, or their numbers in
             a model without names.
         decision: the model's own answer, with the votes and the nearest training
@@ -95,6 +95,10 @@ class Decided:
         held = dict.fromkeys(self.flags, True) | doubts
         flags = in_order({flag for flag, holds in held.items() if holds})
         return replace(self, flags=flags)
+
+    def withheld(self) -> Self:
+        """The decision without a label, flagged as `unknown`."""
+        return replace(self, label=None, confidence=0.0).flagged(unknown=True)
 
     def to_dict(self) -> dict[str, Any]:
         """The event as a JSON object."""

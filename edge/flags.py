@@ -45,10 +45,15 @@ FLAGS = {
         "the features lie far outside those of training and were cut off; `label` is "
         "null where they could not be scaled at all"
     ),
+    "unusual": (
+        "the touch is unlike all training trials, as if the skin, the arm or their "
+        "surroundings had changed: every answer is in doubt, and with `--error` waits "
+        "for the full window"
+    ),
     "unknown": (
-        "the touch is unlike all training trials. With `--error` it waits for the full "
-        "window, and the task with the most labels, such as the object, answers "
-        '"unknown"'
+        "the thing is far from all that training met: `label` is null, and the answers "
+        "of other tasks stand. Only the task that names things, which has the most "
+        "labels, has this flag"
     ),
     "tie": "another label had the same number of votes",
     "unsure": "with `--error`: the window ended before the confidence was reached",

@@ -129,7 +129,7 @@ def _convert(scope: Any, operator: Any, container: Any) -> None:
             projected[spaces] = _projected(build, x, points, spaces)
     _out_of_range(build, [off for _, off in projected.values()], names["out_of_range"])
     if isinstance(model, SequentialClassifier):
-        _novelty(build, x, model.space_, names["novelty"])
+        _doubt(build, x, model.space_, names)
     for task in model.choices:
         _task(build, points, task, projected[_spaces(points, task)], names)
 
@@ -229,9 +229,14 @@ def _out_of_range(build: Builder, excesses: Sequence[str], output: str) -> None:
     build.node("Squeeze", beyond, [1], output=output)
 
 
-def _novelty(build: Builder, x: str, space: NoveltySpace, output: str) -> None:
-    """Nodes that score how unlike all training trials features (n, p) are; see
-    `train.model.novelty`."""
+def _doubt(
+    build: Builder,
+    x: str,
+    space: NoveltySpace,
+    names: Mapping[str, str],
+) -> None:
+    """Nodes that score how unlike all training trials features (n, p) are, by their
+    novelty and remoteness; see `train.model.novelty`."""
     points = space.points
     means = build.by_decision_point_small([p.mean for p in points])
     centred = build.node("Sub", x, means)
@@ -253,13 +258,32 @@ def _novelty(build: Builder, x: str, space: NoveltySpace, output: str) -> None:
     lengths = build.by_decision_point(
         [(p.rows**2).sum(axis=1) for p in points], "lengths of novelty"
     )
-    length = build.squared_length(y)
-    distances = build.node("Gemm", y, columns, lengths)
-    nearest, _ = build.nodes("TopK", [distances, [1]], ["", ""], largest=0)
-    root = build.node("Sqrt", build.node("Add", nearest, length))
+    squares = build.node("Gemm", y, columns, lengths)
+    root = _nearest(build, build.node("Add", squares, build.squared_length(y)))
     product = build.node("Mul", build.node("Sqrt", outside), root)
     units = build.by_decision_point([p.unit for p in points])
-    build.node("Squeeze", build.node("Mul", product, units), [1], output=output)
+    score = build.node("Mul", product, units)
+    build.node("Squeeze", score, [1], output=names["novelty"])
+    weights = build.by_decision_point([p.weights for p in points])
+    weighted = build.node("Mul", y, weights)
+    # The rows' weights are multiplied with those of y, so that the rows are stored
+    # once.
+    twice = build.node("Mul", weighted, weights)
+    lengths = build.by_decision_point(
+        [((p.rows * p.weights) ** 2).sum(axis=1) for p in points],
+        "lengths of remoteness",
+    )
+    squares = build.node("Gemm", twice, columns, lengths)
+    squares = build.node("Add", squares, build.squared_length(weighted))
+    nearness = build.by_decision_point_small([p.nearness for p in points])
+    root = _nearest(build, build.node("Mul", squares, nearness))
+    build.node("Squeeze", root, [1], output=names["remoteness"])
+
+
+def _nearest(build: Builder, squares: str) -> str:
+    """Name of the root (n, 1) of the smallest of squares (n, rows)."""
+    nearest, _ = build.nodes("TopK", [squares, [1]], ["", ""], largest=0)
+    return build.node("Sqrt", nearest)
 
 
 def label_tables(labels: Integers, classes: int) -> dict[str, Array]:
@@ -336,6 +360,7 @@ def _outputs(model: Fitted) -> dict[str, Any]:
     outputs["out_of_range"] = DoubleTensorType([None])
     if sequential:
         outputs["novelty"] = DoubleTensorType([None])
+        outputs["remoteness"] = DoubleTensorType([None])
     return outputs
 
 

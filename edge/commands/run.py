@@ -60,9 +60,9 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--keep-if",
-        default="unsure,unknown",
+        default="unsure,unknown,unusual",
         metavar="WHY",
-        help="which touches are kept: unsure, unknown, all (default: %(default)s)",
+        help="which touches are kept: unsure, unknown, unusual, all (default: %(default)s)",
     )
     parser.add_argument(
         "--keep-mb",

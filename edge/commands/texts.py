@@ -63,7 +63,8 @@ def _onset(line: Line) -> str:
 
 def _decision(line: Line) -> str:
     """The time of a decision, its task, label, confidence and flags."""
-    label = "out of range" if line["label"] is None else line["label"]
+    unnamed = "unknown" if "unknown" in line["flags"] else "out of range"
+    label = unnamed if line["label"] is None else line["label"]
     notes = [", ".join(line["flags"])] if line["flags"] else []
     if "unusual" in line:
         notes.append(line["unusual"])
@@ -76,7 +77,7 @@ def _decision(line: Line) -> str:
     number = _contact(line)
     contact = number and f"{number}:"
     text = f"{time:8.3f} s {contact} {line['task']:<10} {label:<16}"
-    if line["confidence"] is not None:
+    if None not in (line["label"], line["confidence"]):
         text += f" {bar(line['confidence'])} {line['confidence']:4.0%}"
     return f"{text}  ({'; '.join(notes)})" if notes else text
 

@@ -1,6 +1,6 @@
 """What a model's file says beside its graph: its tasks, its features, and its calibration:
-how sure a decision is, when it may come early, and which contacts are unlike everything
-in training."""
+how sure a decision is, when it may come early, and which contacts are unusual or of
+things that were never met."""
 
 from __future__ import annotations
 
@@ -23,12 +23,9 @@ if TYPE_CHECKING:
     from edge.touch.kernels import KernelTable
 
 METADATA_KEY = "edge-classify"
-FORMAT = 7
+FORMAT = 8
 UNKNOWN = "unknown"
-"""The label of a contact that is unlike everything in training."""
-NOVELTY_RATE = 0.02
-"""Rate at which contacts with trained objects may be called unknown. Such answers are
-counted among the certified errors."""
+"""The flag of a contact with a thing that was never met."""
 TEST_SHARE = 0.5
 """Part of the risk that the tests on calibration trials take. The rest covers the
 exported model, which errs more or less often than the folds' models do on average."""
@@ -77,33 +74,51 @@ class Task:
 
 @dataclass(frozen=True)
 class Novelty:
-    """When a contact is unlike everything in training.
+    """When a contact is unusual: unlike all in training, whatever the thing.
 
     The graph scores every contact in a space of its own (`train.model.novelty`).
 
     Attributes:
-        task: with most labels. It names no label for an unknown contact: a new object
-            can still be called soft or movable.
-        rates: shares of trained contacts that score higher than the limits, falling
-            from one half.
-        limits: (decision points, rates) of the score.
+        typical: (decision points,) scores that half of trained contacts exceed.
+        limits: (decision points,) scores that few of them exceed.
+    """
+
+    typical: tuple[float, ...]
+    limits: tuple[float, ...]
+
+    def excess(self, decision_point: int, score: float) -> float:
+        """The logarithm of a score over the typical one; 0 below it."""
+        typical = self.typical[decision_point]
+        return log(score / typical) if score > typical > 0.0 else 0.0
+
+
+@dataclass(frozen=True)
+class Remoteness:
+    """When the thing is unknown: far from all in training by what tells things apart.
+
+    Attributes:
+        task: that names things. It names none that is unknown.
+        typical, limits: as those of `Novelty`.
+        slopes, middles: (decision points,) a thing is known with the probability
+            logistic(slope * (middle - log(score / typical))).
+        worth: shares of left-out things, and `known`, see `train.model.never_met`;
+            empty where none could be left out.
     """
 
     task: str
-    rates: tuple[float, ...]
-    limits: tuple[tuple[float, ...], ...]
+    typical: tuple[float, ...]
+    limits: tuple[float, ...]
+    slopes: tuple[float, ...]
+    middles: tuple[float, ...]
+    worth: Mapping[str, float] = field(default_factory=dict)
 
-    def rate(self, decision_point: int, score: float) -> float:
-        """The smallest novelty rate at which a score counts as unknown; 1 if it never
-        does."""
-        limits = zip(self.rates, self.limits[decision_point], strict=True)
-        return min((rate for rate, limit in limits if score > limit), default=1.0)
-
-    def excess(self, decision_point: int, score: float) -> float:
-        """The logarithm of a score over that of half of the trained contacts; 0 below
-        it."""
-        typical = self.limits[decision_point][0]
-        return log(score / typical) if score > typical > 0.0 else 0.0
+    def known(self, decision_point: int, score: float) -> float:
+        """Probability, 0 to 1, that the thing is one of those in training."""
+        typical = self.typical[decision_point]
+        if not score > 0.0 < typical:
+            return 1.0
+        nearer = self.middles[decision_point] - log(score / typical)
+        return logistic(self.slopes[decision_point] * nearer)
 
 
 def margin(distances: Sequence[float], label: int) -> float:
@@ -129,7 +144,7 @@ class StoppingRule:
     """Decide at the first decision point that is sure enough, and at the last one in
     any case.
 
-    A contact that is unknown there waits until it no longer is, or for the full window.
+    An unusual contact waits until it no longer is, or for the full window.
 
     Attributes:
         error: certified: decisions are wrong at most this often.
@@ -234,6 +249,8 @@ class ModelInfo:
     """The stopping rules of each task; empty without decision points."""
     novelty: Novelty | None = None
     """The limits of novelty; None without decision points."""
+    remoteness: Remoteness | None = None
+    """The limits of remoteness; None without decision points."""
     joints: int = 0
     """Number of joint angles in a frame, if a feature is made of them; else 0."""
     kernels: Mapping[str, KernelTable] = field(default_factory=dict)

@@ -6,7 +6,15 @@ from collections.abc import Iterator, Sequence
 
 from edge.config import ConfigTable, parse_json, short_text
 from edge.errors import InputError, about
-from edge.model.info import FORMAT, ModelInfo, Novelty, Stopping, StoppingRule, Task
+from edge.model.info import (
+    FORMAT,
+    ModelInfo,
+    Novelty,
+    Remoteness,
+    Stopping,
+    StoppingRule,
+    Task,
+)
 from edge.touch.contact import feature_types
 from edge.touch.feature import KERNELS
 from edge.touch.layout import SkinLayout
@@ -55,11 +63,13 @@ def _read(meta: ConfigTable) -> ModelInfo:
         chain = Chain.from_dict(arm, where=f"{meta.where}: arm")
     stopping = {}
     novelty = None
+    remoteness = None
     if points:
         rules = meta.table("stopping")
         for task in rules.raw:
             stopping[task] = read_stopping(rules.table(task), len(points))
         novelty = read_novelty(meta.table("novelty"), len(points))
+        remoteness = read_remoteness(meta.table("remoteness"), len(points))
     kernels = {}
     if not KERNELS.keys().isdisjoint(names):
         from edge.touch.kernels import read_tables  # few models have any
@@ -81,6 +91,7 @@ def _read(meta: ConfigTable) -> ModelInfo:
         decision_points_s=points,
         stopping=stopping,
         novelty=novelty,
+        remoteness=remoteness,
         joints=meta.whole("joints", 0, allowed=range(0, 1001)),
         kernels=kernels,
         name=meta.text("name", "", empty=True),
@@ -151,20 +162,27 @@ def read_novelty(table: ConfigTable, points: int) -> Novelty:
     Raises:
         InputError: the table is damaged.
     """
-    rates = table.numbers("rates")
-    rows = table.get("limits")
-    if not rates or not isinstance(rows, list | tuple) or len(rows) != points:
-        raise table.fail("limits", f"{points} rows of a number for each of the rates")
-    if sorted({0.0, *rates, 1.0}) != [0.0, *rates[::-1], 1.0]:
-        raise table.fail("rates", "numbers between 0 and 1 that fall")
-    limits = []
-    for row in rows:
-        line = ConfigTable({"limits": row}, table.where, table.prefix)
-        numbers = line.numbers("limits", len(rates))
-        if sorted([0.0, *numbers]) != [0.0, *numbers]:
-            raise table.fail("limits", "rows of numbers from 0 on that rise")
-        limits.append(numbers)
-    return Novelty(table.text("task"), rates, tuple(limits))
+    return Novelty(
+        typical=table.numbers("typical", points, low=0.0),
+        limits=table.numbers("limits", points, low=0.0),
+    )
+
+
+def read_remoteness(table: ConfigTable, points: int) -> Remoteness:
+    """The limits of remoteness, of a model with this number of decision points.
+
+    Raises:
+        InputError: the table is damaged.
+    """
+    worth = table.table("worth")
+    return Remoteness(
+        task=table.text("task"),
+        typical=table.numbers("typical", points, low=0.0),
+        limits=table.numbers("limits", points, low=0.0),
+        slopes=table.numbers("slopes", points, low=0.0),
+        middles=table.numbers("middles", points),
+        worth={name: worth.number(name, low=0.0, high=1.0) for name in worth.raw},
+    )
 
 
 def _usual(meta: ConfigTable, names: Sequence[str]) -> dict[str, Sequence[float]]:
@@ -231,5 +249,5 @@ def _points_fit(info: ModelInfo) -> bool:
     rising = sorted({0.0, *points}) == [0.0, *points]
     if not rising or points[-1] != info.window_s:
         return False
-    named = info.novelty is not None and info.novelty.task in info.tasks
+    named = info.remoteness is not None and info.remoteness.task in info.tasks
     return named and info.stopping.keys() == info.tasks.keys()

@@ -47,8 +47,9 @@ class Decision(NamedTuple):
             agree.
         out_of_range: the features lie so far outside those of the training trials that
             the model cut them off; see `train.model.projection.Grid`.
-        novelty: how unlike all training trials the features are (see
-            `edge.model.info.Novelty`), of a model with decision points.
+        novelty, remoteness: how unlike all training trials the features are, and how
+            far from all known things (see `edge.model.info`), of a model with decision
+            points.
     """
 
     label: str
@@ -61,6 +62,7 @@ class Decision(NamedTuple):
     label_distances: Floats | None = None
     out_of_range: bool = False
     novelty: float = 0.0
+    remoteness: float = 0.0
 
 
 class Model:
@@ -272,14 +274,16 @@ class Model:
         if label >= len(shares) or not 0.0 <= shares[label] <= 1.0:
             raise self._broken(f"{task} is answered by label {label} of {len(shares)}")
         novelty = float(answers.get("novelty", 0.0))
+        remoteness = float(answers.get("remoteness", 0.0))
         confidence = None
         if self.info.novelty is not None:
+            excess = self.info.novelty.excess(point, novelty)
             confidence = self.info.stopping[task].confidence(
-                point,
-                distances.tolist(),
-                label,
-                self.info.novelty.excess(point, novelty),
+                point, distances.tolist(), label, excess
             )
+        names = self.info.remoteness
+        if names is not None and names.task == task and confidence is not None:
+            confidence *= names.known(point, remoteness)
         return Decision(
             label=self.info.tasks[task].labels[label],
             confidence=confidence,
@@ -291,6 +295,7 @@ class Model:
             label_distances=distances,
             out_of_range=bool(answers["out_of_range"] > 0.0),
             novelty=novelty,
+            remoteness=remoteness,
         )
 
     def _broken(self, reason: str) -> InputError:
@@ -319,7 +324,8 @@ def _outputs(info: ModelInfo) -> dict[str, tuple[str, list[int]]]:
     metadata."""
     outputs: dict[str, tuple[str, list[int]]] = {"out_of_range": ("tensor(double)", [])}
     if info.decision_points_s:
-        outputs["novelty"] = "tensor(double)", []
+        for score in ("novelty", "remoteness"):
+            outputs[score] = "tensor(double)", []
     for task, entry in info.tasks.items():
         outputs |= {
             f"{task}_label": ("tensor(int64)", []),

@@ -12,7 +12,7 @@ by.
 | `vectors` | float64 (v, width) | feature vectors; the first m are the trials', in order |
 | `<task>_label`, `_scores`, `_distances`, `_neighbours` | | the graph's outputs for `vectors` |
 | `<task>_label_distances` | float64 (v, labels) | likewise, where the model gives them |
-| `novelty` | float64 (v,) | likewise |
+| `novelty`, `remoteness` | float64 (v,) | likewise |
 | `out_of_range` | float64 (v,) | the graph's output |
 | `decision_point_vectors` | float64 (points, w, width) | vectors for each decision point |
 | `<task>_decision_point_label`, ... | | the graph's outputs for these, each at its point |
@@ -42,7 +42,7 @@ from edge.touch.layout import SkinLayout
 
 OUTPUTS = ("label", "neighbours", "scores", "distances")
 """Ends of the names of a task's outputs."""
-OF_ALL_TASKS = ("novelty", "out_of_range")
+OF_ALL_TASKS = ("novelty", "remoteness", "out_of_range")
 """Outputs that belong to no task."""
 
 Line = tuple[str, Array, Array]

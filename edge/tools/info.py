@@ -7,6 +7,7 @@ compares two on recordings.
 
 import argparse
 import json
+from collections.abc import Mapping
 from typing import Any
 
 from edge.commands.output import Output, counted
@@ -63,6 +64,8 @@ def description(info: ModelInfo, about: dict[str, Any]) -> str:
     if info.decision_points_s:
         points = ", ".join(f"{point:g}" for point in info.decision_points_s)
         lines.append(f"With --error, it may decide at {points} s.")
+    if info.remoteness is not None:
+        lines += wrapped(worth_text(info.remoteness.task, info.remoteness.worth))
     for sentence in _origin(info):
         lines += wrapped(sentence)
     if not about["digest"]:
@@ -71,6 +74,24 @@ def description(info: ModelInfo, about: dict[str, Any]) -> str:
             "may go unnoticed."
         )
     return "\n".join(lines)
+
+
+def worth_text(task: str, worth: Mapping[str, float]) -> str:
+    """What the doubt about a task's names is worth, in words; see
+    `edge.model.info.Remoteness`."""
+    if not worth:
+        return (
+            f"How the {task} of things that it has not met is answered is not known: "
+            "too few were trained for any to be left out."
+        )
+    unknown, unsure, sure, known = (
+        f"{worth[name]:.0%}" for name in ("unknown", "unsure", "sure", "known")
+    )
+    return (
+        f"Of touches of each {task} that it has not met, {unknown} are called unknown, "
+        f"{unsure} are named with a confidence below 50 %, {sure} with more than 90 %; "
+        f"of those that it knows {known} are called unknown."
+    )
 
 
 def _origin(info: ModelInfo) -> list[str]:

@@ -13,7 +13,7 @@ from edge.commands.output import LOG, counted
 from edge.commands.source import Opened
 from edge.errors import EdgeError, InputError
 from edge.events import Decided, Event
-from edge.model.info import UNKNOWN, ModelInfo
+from edge.model.info import ModelInfo
 from edge.recording import load_arrays, load_meta
 from edge.saving import alone, save
 from edge.tools.record import Trials, recording, shared_meta
@@ -21,7 +21,7 @@ from edge.tools.review import UNSURE, decisions_of
 from edge.touch.frame import Frame
 from edge.writing import check_writable
 
-REASONS = ("unsure", "unknown", "all")
+REASONS = ("unsure", "unknown", "unusual", "all")
 LONGEST_S = 10.0
 """Seconds from onset that are kept of a touch."""
 WAITING = 4
@@ -180,9 +180,8 @@ def reasons_of(decided: Sequence[Decided]) -> set[str]:
     reasons = {"all"}
     for decision in decided:
         sure = decision.confidence
-        if UNKNOWN in decision.flags:
-            reasons.add("unknown")
-        if sure is None or sure < UNSURE or "unsure" in decision.flags:
+        reasons.update(set(REASONS) & set(decision.flags))
+        if sure is None or sure < UNSURE:
             reasons.add("unsure")
     return reasons
 

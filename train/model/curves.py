@@ -68,14 +68,18 @@ class Curve:
         margins: Floats,
         excess: Floats,
         share: float,
+        known: Floats | float = 1.0,
     ) -> Curve:
-        """The curve with the intercept at which the mean probability is `share`."""
+        """The curve with the intercept at which the mean probability is `share`, each
+        times that of `known`."""
         half_a_trial = 0.5 / margins.size
-        target = min(max(share, half_a_trial), 1.0 - half_a_trial)
+        most = float(np.mean(known)) - half_a_trial
+        target = min(max(share, half_a_trial), most)
 
         def surplus(shift: float) -> float:
             shifted = replace(self, intercept=self.intercept + shift)
-            return float(shifted.probabilities(margins, excess).mean()) - target
+            probabilities = shifted.probabilities(margins, excess) * known
+            return float(probabilities.mean()) - target
 
         reach = 50.0 + abs(self.slope) * float(np.abs(margins).max(initial=0.0))
         shift = float(brentq(surplus, -reach, reach))

@@ -53,17 +53,17 @@ def upper_limit(wrong: int, trials: int, level: float) -> float:
     return float(beta.ppf(1.0 - level, wrong + 1, trials - wrong))
 
 
-def stops(confidence: Floats, rule: StoppingRule, unknown: Booleans) -> Integers:
+def stops(confidence: Floats, rule: StoppingRule, unusual: Booleans) -> Integers:
     """(n,) the decision point at which a rule decides, as `edge.Classifier` does.
 
     Args:
         confidence: (points, n) that the labels are right, by the curve of all points.
         rule: the rule.
-        unknown: (points, n) whether the contact is unlike all trained ones, and so
+        unusual: (points, n) whether the contact is unlike all trained ones, and so
             waits.
     """
-    decides = (confidence >= rule.confidence) & ~unknown
-    decides[rule.last :] = ~unknown[rule.last :]
+    decides = (confidence >= rule.confidence) & ~unusual
+    decides[rule.last :] = ~unusual[rule.last :]
     decides[-1] = True
     return np.asarray(decides.argmax(axis=0))
 
@@ -77,25 +77,27 @@ class Course:
             parts of a product are its two factors, and it is decided when both are; any
             other task is its only part.
         wrong: (decision points, n) of each part.
-        unknown: (decision points, n) whether the contact is unlike all trained ones.
-        withheld: whether the task names nothing for an unknown contact.
+        unusual: (decision points, n) whether the contact is unlike all trained ones.
+        withheld: (decision points, n) whether the task names nothing, as the thing is
+            unknown; None of a task that always answers.
     """
 
     confidences: Sequence[Floats]
     wrong: Sequence[Booleans]
-    unknown: Booleans
-    withheld: bool = False
+    unusual: Booleans
+    withheld: Booleans | None = None
 
     def under(self, rule: StoppingRule) -> tuple[Integers, Booleans]:
         """(n,) the decision point at which a rule decides, and whether the answer is
         wrong."""
-        trials = np.arange(self.unknown.shape[1])
-        at = [stops(confidence, rule, self.unknown) for confidence in self.confidences]
+        trials = np.arange(self.unusual.shape[1])
+        at = [stops(confidence, rule, self.unusual) for confidence in self.confidences]
         last = np.max(at, axis=0)
         pairs = zip(self.wrong, at, strict=True)
         wrong = [of_part[points, trials] for of_part, points in pairs]
-        withheld = self.unknown[last, trials] & self.withheld
-        return last, np.any([*wrong, withheld], axis=0)
+        if self.withheld is not None:
+            wrong.append(self.withheld[last, trials])
+        return last, np.any(wrong, axis=0)
 
 
 def candidates(points: int) -> tuple[StoppingRule, list[list[StoppingRule]]]:
@@ -115,7 +117,7 @@ def certify(course: Course, seconds: Floats) -> list[StoppingRule]:
         course: of the task, on the calibration trials.
         seconds: (points,) windows.
     """
-    n = course.unknown.shape[1]
+    n = course.unusual.shape[1]
     full_level = TEST_SHARE * RISK
 
     def tested(rule: StoppingRule, level: float, before: float) -> StoppingRule:

@@ -19,10 +19,10 @@ points with one threshold, so these come from one logistic regression on all poi
 together. With a curve for each point, an early point hardly reaches the threshold, and
 clear contacts wait as long as others.
 
-A touch that is unlike the training data at a decision point waits, for the full window
-if it stays so: rules are tested with this wait, at `NOVELTY_RATE` and with the other
-folds' limits for a fold's distances. An error is a wrong label. The task with most
-labels then names nothing, so an `unknown` for a trained object is an error of it too.
+A touch that is unusual at a decision point waits, for the full window if it stays so:
+rules are tested with this wait. An error is a wrong label. The task that names things,
+which has most labels, names none that is unknown, so an `unknown` for a trained thing
+is an error of it too.
 """
 
 from __future__ import annotations
@@ -35,18 +35,26 @@ import numpy as np
 from edge.arrays import Booleans, Floats, Integers
 from edge.elementary import log
 from edge.errors import InputError
-from edge.model.info import (
-    NOVELTY_RATE,
-    Novelty,
-    Stopping,
-    StoppingRule,
-)
+from edge.model.info import Novelty, Stopping, StoppingRule
 from edge.touch.features import FEATURES
 from train.data.folds import finest, stratified_folds
 from train.data.vectors import Strings, Vectors
 from train.model.curves import Curve, cross_fitted
 from train.model.held_out import AtPoints, HeldOut, answers, held_out
-from train.model.novelty import FOLDS, NoveltySpace, held_out_scores, limits_of
+from train.model.never_met import (
+    is_unknown,
+    known_of,
+    remoteness_of,
+    thing_folds,
+    worth_of,
+)
+from train.model.novelty import (
+    FOLDS,
+    UNUSUAL_RATE,
+    NoveltySpace,
+    held_out_scores,
+    limits_of,
+)
 from train.model.pipeline import Choices, ContactClassifier
 from train.model.rules import RISK, Agreeing, Course, candidates, certify
 from train.threads import single_thread
@@ -73,15 +81,14 @@ class Early:
 def excess_of(novelty: Novelty, scores: Floats) -> Floats:
     """(points, n) by how much the logarithm of the novelty (points, n) is above that of
     half of the trials; 0 below."""
-    typical = np.array([row[0] for row in novelty.limits])[:, None]
+    typical = np.array(novelty.typical)[:, None]
     ratios = np.maximum(np.nan_to_num(scores), typical) / typical
     return np.asarray(log(ratios))
 
 
-def unlike(novelty: Novelty, scores: Floats) -> Booleans:
-    """(points, n) whether contacts are unknown, from their novelty (points, n)."""
-    limits = np.array(novelty.limits)[:, novelty.rates.index(NOVELTY_RATE)]
-    return np.asarray(scores > limits[:, None])
+def is_unusual(novelty: Novelty, scores: Floats) -> Booleans:
+    """(points, n) whether contacts are unusual, from their novelty (points, n)."""
+    return np.asarray(scores > np.array(novelty.limits)[:, None])
 
 
 @dataclass(frozen=True)
@@ -118,10 +125,10 @@ class SequentialClassifier:
         columns_: the columns of the vectors that these take, rising.
         right_: {task: (decision points, n) whether the labels named without a trial are
             right}.
-        unknown_: (decision points, n) whether trials are unlike all others.
+        unusual_, unknown_: (decision points, n) the doubts about trials without them.
         stopping_: {task: Stopping}.
-        space_: in which novelty is scored.
-        novelty_: its limits.
+        space_: in which novelty and remoteness are scored.
+        novelty_, remoteness_: their limits.
     """
 
     choices: Choices
@@ -158,7 +165,8 @@ class SequentialClassifier:
         vectors = Vectors(X, y, self.features, self.widths)
         self._folds = folds
         self._tested = {task: (folds >= 0) & (y[task] != "") for task in self.choices}
-        self._fit_novelty(self._fit_points(vectors), folds)
+        of_model = self._fit_points(vectors)
+        self._fit_novelty(of_model, folds)
         of_folds = self.without(fold_choices, self.early)
         of_all = [self.choices_at] * len(of_folds)
         chosen_without, chosen_by_all = held_out(
@@ -171,6 +179,7 @@ class SequentialClassifier:
         self.stopping_ = self._with_curves(
             self._certified(chosen_without), chosen_by_all
         )
+        self.remoteness_ = replace(self._bare, worth=self._worth(of_model))
         return self
 
     @property
@@ -212,9 +221,9 @@ class SequentialClassifier:
         return vectors
 
     def _fit_novelty(self, vectors: Vectors, folds: Integers) -> None:
-        """Fit the space of novelty, and set its limits by held-out trials."""
-        most = finest({task: vectors.y[task] for task in self.choices})
-        labels = vectors.y[most]
+        """Fit the space of doubt, and set its limits by held-out trials."""
+        self._name = finest({task: vectors.y[task] for task in self.choices})
+        labels = vectors.y[self._name]
         with single_thread():
             self.space_ = NoveltySpace.of(vectors.X, labels, vectors.columns)
         novelty_folds = np.where(folds >= 0, stratified_folds(labels, FOLDS), -1)
@@ -225,9 +234,45 @@ class SequentialClassifier:
             vectors.columns,
             self.jobs,
         )
-        self.novelty_ = limits_of(most, scores[:, folds >= 0])
-        self._excess = excess_of(self.novelty_, scores)
-        self.unknown_ = unlike(self.novelty_, scores)
+        tested = scores.part(folds >= 0)
+        self.novelty_ = Novelty(*limits_of(tested.novelty, UNUSUAL_RATE))
+        self._excess = excess_of(self.novelty_, scores.novelty)
+        self._things = thing_folds(np.where(folds >= 0, labels, ""))
+        left_out = None
+        if self._things is not None:
+            of_vectors = vectors.X, labels, self._things, vectors.columns
+            self._left_out = held_out_scores(*of_vectors, self.jobs)
+            left_out = self._left_out.part(self._things >= 0).remoteness
+        self._bare = remoteness_of(self._name, tested.remoteness, left_out)
+        self._known = known_of(self._bare, scores.remoteness)
+        self.unusual_ = is_unusual(self.novelty_, scores.novelty)
+        self.unknown_ = is_unknown(self._bare, scores.remoteness)
+
+    def _worth(self, vectors: Vectors) -> dict[str, float]:
+        """What the doubt about names is worth, by answers to things that were left out;
+        empty where none could be. The vectors are those that the model takes."""
+        things = self._things
+        if things is None:
+            return {}
+        task = self._name
+        choices = {t: self.choices[t] for t in (task, *self.products_.get(task, ()))}
+        at_end = replace(vectors, X=vectors.X[-1:])
+        count = int(things.max()) + 1
+        (named,) = held_out(at_end, things, [[[choices]] * count], self.jobs)
+        scores = self._left_out.part(things >= 0)
+        margins = named.margins[task][:, things >= 0]
+        excess = excess_of(self.novelty_, scores.novelty)
+        curves = self._confidence(task, np.tile(margins, (len(excess), 1)), excess)
+        confidence = curves * known_of(self._bare, scores.remoteness)
+        unknown = is_unknown(self._bare, scores.remoteness)
+        known = self.unknown_[-1, self._folds >= 0]
+        return worth_of(known, unknown[-1], confidence[-1])
+
+    def _confidence(self, task: str, margins: Floats, excess: Floats) -> Floats:
+        """(points, m) confidences by a task's curve of each decision point."""
+        stopping = self.stopping_[task]
+        curves = map(Curve, stopping.slopes, stopping.intercepts, stopping.doubts)
+        return np.stack(list(map(Curve.probabilities, curves, margins, excess)))
 
     def _certified(self, answered: HeldOut) -> dict[str, Certified]:
         """{task: its rules}, by answers whose settings were chosen without the fold."""
@@ -235,7 +280,8 @@ class SequentialClassifier:
         for task, right in answered.right.items():
             evidence = answered.margins[task], self._excess, right
             scores[task] = cross_fitted(*evidence, self._folds, self._tested[task])
-        courses = self._courses(scores, answered.right, self.unknown_, self._tested)
+        doubts = self.unusual_, self.unknown_
+        courses = self._courses(scores, answered.right, doubts, self._tested)
         seconds = np.array(self.decision_points_s)
         rules = {task: certify(course, seconds) for task, course in courses.items()}
         for task, factors in self.products_.items():
@@ -269,7 +315,10 @@ class SequentialClassifier:
                 self.right_[task][:, tests],
             )
             together = _curve(*evidence)
-            curves = map(_curve, *evidence)
+            known = self._known[:, tests]
+            if task != self._name:
+                known = np.ones_like(known)
+            curves = map(_curve, *evidence, known)
             slopes, intercepts, doubts = zip(*map(astuple, curves), strict=True)
             stopping[task] = Stopping(
                 slopes=slopes,
@@ -305,7 +354,7 @@ class SequentialClassifier:
         with single_thread():
             answered = answers(self.decision_points_, X)
         scores = self.space_.scores(X)
-        excess = excess_of(self.novelty_, scores)
+        excess = excess_of(self.novelty_, scores.novelty)
         right = {}
         confidence = {}
         together = {}
@@ -314,38 +363,35 @@ class SequentialClassifier:
             right[task] = labels == y[task]
             pooled = Curve(stopping.slope, stopping.intercept, stopping.doubt)
             together[task] = pooled.probabilities(margins, excess)
-            curves = map(Curve, stopping.slopes, stopping.intercepts, stopping.doubts)
-            by_point = map(Curve.probabilities, curves, margins, excess)
-            confidence[task] = np.stack(list(by_point))
-        unknown = unlike(self.novelty_, scores)
+            confidence[task] = self._confidence(task, margins, excess)
+        confidence[self._name] *= known_of(self.remoteness_, scores.remoteness)
+        unusual = is_unusual(self.novelty_, scores.novelty)
+        doubts = unusual, is_unknown(self.remoteness_, scores.remoteness)
         tested = {task: y[task] != "" for task in right}
-        return right, confidence, self._courses(together, right, unknown, tested)
+        return right, confidence, self._courses(together, right, doubts, tested)
 
     def _courses(
         self,
         scores: Mapping[str, Floats],
         right: Mapping[str, Booleans],
-        unknown: Booleans,
+        doubts: tuple[Booleans, Booleans],
         tested: Mapping[str, Booleans],
     ) -> dict[str, Course]:
         """{task: its course}, from each task's own answers and confidences for rules
-        (points, n).
+        (points, n), and whether contacts are unusual and unknown (points, n).
 
         The trials `tested` (n,) count; for a product, those that count for its factors
         too.
         """
         courses = {}
+        unusual, unknown = doubts
         for task in self.choices:
             deciding = tuple(self.products_.get(task, (task,)))
             decided = np.all([tested[t] for t in (task, *deciding)], axis=0)
             sure = [scores[part][:, decided] for part in deciding]
             wrong = [~right[part][:, decided] for part in deciding]
-            courses[task] = Course(
-                sure,
-                wrong,
-                unknown[:, decided],
-                task == self.novelty_.task,
-            )
+            withheld = unknown[:, decided] if task == self._name else None
+            courses[task] = Course(sure, wrong, unusual[:, decided], withheld)
         return courses
 
 
@@ -354,7 +400,9 @@ def _curve(
     excess: Floats,
     right: Booleans,
     honest: Booleans,
+    known: Floats | float = 1.0,
 ) -> Curve:
-    """The curve of answers, with the mean probability of honest ones."""
+    """The curve of answers, with the mean probability of honest ones, each times that
+    of `known`."""
     share = float(honest.mean())
-    return Curve.of(margins, excess, right).with_mean(margins, excess, share)
+    return Curve.of(margins, excess, right).with_mean(margins, excess, share, known)

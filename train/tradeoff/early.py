@@ -219,7 +219,7 @@ def _compared(
     course = _joined([fold.courses[task] for fold in folds])
     points = tuple(decision_points_s)
     certified = [] if stopping is None else _certified(course, stopping, points)
-    shown = replace(course, withheld=False)
+    shown = replace(course, withheld=None)
     return StoppingComparison(points, right, confidence, shown, certified)
 
 
@@ -227,11 +227,12 @@ def _joined(courses: Sequence[Course]) -> Course:
     """The course of several folds together."""
     confidences = zip(*(course.confidences for course in courses), strict=True)
     wrong = zip(*(course.wrong for course in courses), strict=True)
+    withheld = [course.withheld for course in courses if course.withheld is not None]
     return Course(
         confidences=list(map(np.hstack, confidences)),
         wrong=list(map(np.hstack, wrong)),
-        unknown=np.hstack([course.unknown for course in courses]),
-        withheld=courses[0].withheld,
+        unusual=np.hstack([course.unusual for course in courses]),
+        withheld=np.hstack(withheld) if withheld else None,
     )
 
 
@@ -249,13 +250,15 @@ def _certified(
         if rule is None:
             continue
         at, wrong = course.under(rule)
-        withheld = course.unknown[at, np.arange(len(at))] & course.withheld
+        unknown = 0.0
+        if course.withheld is not None:
+            unknown = float(course.withheld[at, np.arange(len(at))].mean())
         certified.append(
             Certified(
                 error=error,
                 right=~wrong,
                 waited=~late,
-                unknown=float(withheld.mean()),
+                unknown=unknown,
                 early=float((at < len(seconds) - 1).mean()),
                 seconds=seconds[at],
             )

@@ -187,11 +187,10 @@ REFUSED = {
     edited(
         lambda m: m["tasks"].update(mobility=m["tasks"]["category"])
     ): "no tensor(int64) mobility_label",
-    # Each pair of a rigid or soft category and one of four objects would need a label
-    # of its own.
+    # Three objects would have one pair of labels.
     edited(
         lambda m: m["tasks"]["object"].update(
-            factors={"category": [0, 0, 1, 1], "object": [0, 1, 2, 3]}
+            factors={"category": [0, 0, 1, 1], "mobility": [0, 0, 0, 1]}
         )
     ): "task 'object' is not the product of its factors",
     category(

@@ -24,6 +24,7 @@ def decision(confidence, *flags):
         (decision(None), {"all", "unsure"}),
         (decision(0.95, "unsure"), {"all", "unsure"}),
         (decision(0.95, "unknown"), {"all", "unknown"}),
+        (decision(0.95, "unusual", "tie"), {"all", "unusual"}),
     ],
 )
 def test_a_touch_is_kept_for_what_is_not_sure_of_it(doubted, expected):
@@ -32,7 +33,9 @@ def test_a_touch_is_kept_for_what_is_not_sure_of_it(doubted, expected):
 
 def test_reasons_are_a_list_of_names():
     assert reasons("unsure,all") == ("unsure", "all")
-    with pytest.raises(InputError, match="--keep-if takes unsure, unknown, all"):
+    with pytest.raises(
+        InputError, match="--keep-if takes unsure, unknown, unusual, all"
+    ):
         reasons("never")
 
 

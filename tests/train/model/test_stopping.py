@@ -6,14 +6,12 @@ import pytest
 from scipy.special import logit
 
 from edge.errors import InputError
-from edge.model.info import NOVELTY_RATE
 from train.data.folds import stratified_folds
 from train.model.held_out import answers
 from train.model.pipeline import Choice
 from train.model.stopping import (
     SequentialClassifier,
     excess_of,
-    unlike,
 )
 
 SECONDS = np.array([0.4, 0.8, 1.2])
@@ -58,7 +56,7 @@ def test_rules_ask_for_the_same_margin_at_every_decision_point():
     X, labels = touches(60)
     model = calibrated(of_neighbours(3), X, {"t": labels})
     _, margins = answers(model.decision_points_, X)["t"]
-    excess = excess_of(model.novelty_, model.space_.scores(X))
+    excess = excess_of(model.novelty_, model.space_.scores(X).novelty)
     *_, courses = model.judged(X, {"t": labels})
     log_odds = logit(courses["t"].confidences[0])
     stopping = model.stopping_["t"]
@@ -81,30 +79,21 @@ def test_each_fold_is_answered_by_what_was_chosen_without_it():
 def test_a_held_out_trial_is_never_its_own_neighbour():
     X, labels = touches(60)
     model = calibrated(of_neighbours(1), X, {"t": labels})
-    assert (np.array(model.novelty_.limits) > 0.0).all()
-    assert (model.space_.scores(X) == 0.0).all()
+    assert min(*model.novelty_.limits, *model.remoteness_.limits) > 0.0
+    assert (model.space_.scores(X).novelty == 0.0).all()
 
 
-def test_a_touch_unlike_all_others_is_an_error_of_the_task_that_then_names_nothing():
+def test_an_unknown_thing_is_an_error_of_the_task_that_then_names_nothing():
     X, labels = touches(200)
     things = np.char.add(labels, np.where(X[1, :, 1] > 0, "+", "-"))
     choices = {"kind": Choice("none", 12, 1), "thing": Choice("none", 12, 1)}
     model = calibrated(choices, X, {"kind": labels, "thing": things})
-    assert model.novelty_.task == "thing"
+    assert model.remoteness_.task == "thing"
     unknown = model.unknown_[-1]
     right = {task: answers[-1] for task, answers in model.right_.items()}
     assert 0 < (unknown & right["thing"]).sum() < 10
     assert model.stopping_["kind"].wrong == int((~right["kind"]).sum())
     assert model.stopping_["thing"].wrong == int((~right["thing"] | unknown).sum())
-
-
-def test_a_touch_is_unknown_beyond_the_limit_of_its_decision_point():
-    X, labels = touches(60)
-    novelty = calibrated(of_neighbours(1), X, {"t": labels}).novelty_
-    distances = np.array([row[-2] for row in novelty.limits])[:, None] + [0.0, 1e-9]
-    assert novelty.rates[-2] == NOVELTY_RATE
-    assert unlike(novelty, distances).tolist() == [[False, True]] * 3
-    assert novelty.rate(1, float(distances[1, 1])) <= NOVELTY_RATE
 
 
 def test_what_no_task_takes_is_there_for_the_folds_alone():
@@ -120,7 +109,7 @@ def test_what_no_task_takes_is_there_for_the_folds_alone():
     assert model.columns_.tolist() == list(range(6, 12))
     assert model.n_features_in_ == 6
     assert model.right_["t"][-1].all()
-    assert (model.space_.scores(X[..., model.columns_]) == 0.0).all()
+    assert (model.space_.scores(X[..., model.columns_]).novelty == 0.0).all()
 
 
 def test_too_few_trials_are_refused():

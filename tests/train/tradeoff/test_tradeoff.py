@@ -287,7 +287,7 @@ class TestEarly:
         all others for another."""
         wrong = np.array([[True, False, False, False], [False] * 4])
         unknown = np.array([[False] * 4, [True, False, False, False]])
-        course = Course([np.full((2, 4), 0.5)], [wrong], unknown, withheld=True)
+        course = Course([np.full((2, 4), 0.5)], [wrong], unknown, withheld=unknown)
         rules = StoppingRule(0.12, 1.2, NEVER, 1), StoppingRule(0.2, 0.6, 0.5, 1)
         stopping = Stopping((), (), (), 0.0, 0.0, 0.0, rules, 4, 0, 0.1)
         late, soon = early._certified(course, stopping, (0.6, 1.2))
