@@ -46,6 +46,7 @@ def description(info: ModelInfo, about: dict[str, Any]) -> str:
     """The description for a person."""
     named = f"{info.name} " if info.name else ""
     size = f"{about['bytes'] / 1024:.0f} kB, format {about['format']}"
+    size += "" if about["digest"] else ", no digest"
     lines = [f"{about['file']}: {named}{about['version']}, {size}", ""]
     for name, task in info.tasks.items():
         lines += wrapped(
@@ -65,11 +66,6 @@ def description(info: ModelInfo, about: dict[str, Any]) -> str:
         lines.append(f"With --error, it may decide at {points} s.")
     for sentence in _origin(info):
         lines += wrapped(sentence)
-    if not about["digest"]:
-        lines += wrapped(
-            "It has no digest, as it was made by an earlier version: damage to the file "
-            "may go unnoticed."
-        )
     return "\n".join(lines)
 
 
