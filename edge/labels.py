@@ -5,8 +5,6 @@ import logging
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from edge.errors import InputError
-
 LOG = logging.getLogger(__name__)
 
 Labels = Mapping[str, str]
@@ -14,18 +12,12 @@ Labels = Mapping[str, str]
 
 
 def plain(labels: Labels, path: str) -> dict[str, str]:
-    """Labels of a file with a space in place of characters that cannot be printed, and
-    none at their ends; a warning says so.
-
-    Raises:
-        InputError: nothing is left of one.
-    """
+    """Labels of a file without blanks at their ends, and with _ for what cannot be
+    printed; a warning says so."""
     texts = []
     for text in (*labels, *labels.values()):
-        shown = "".join(c if c.isprintable() else " " for c in text)
-        texts.append(" ".join(shown.split()))
-    if not all(texts):
-        raise InputError(f"the labels {dict(labels)} hold nothing that can be read")
+        shown = [c if c.isprintable() else "_" for c in text.strip()]
+        texts.append("".join(shown) or "_")
     read = dict(zip(texts, texts[len(labels) :], strict=False))
     LOG.warning(f"{path}: the labels {dict(labels)} are read as {read}")
     return read

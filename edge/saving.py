@@ -1,9 +1,8 @@
 """Recordings in folders: written, found, and changed by one program at a time.
 
 A change of labels, or a deletion, is noted in a journal in each folder, then carried out.
-The first folder's journal is written last: from then on the change counts, and whatever
-reads the folders finishes it; before, nothing has changed. In the end a journal becomes
-the note by which the change is taken back.
+Whatever reads a folder finishes it. In the end the journal becomes the note by which the
+change is taken back.
 """
 
 import json
@@ -11,7 +10,7 @@ import logging
 import os
 import shutil
 import time
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -35,9 +34,9 @@ UNDO = ".edge-classify-undo.json"
 """The note of the last change."""
 DELETED = ".edge-classify-deleted"
 """The folder of recordings that were deleted last."""
-PATIENCE_S = 10.0
-"""Longest time to wait for another program."""
 LOOK_S = 0.02
+LOOKS = 500
+"""How often to look whether another program has ended."""
 
 
 Pair = tuple[Labels | None, Labels | None]
@@ -46,23 +45,11 @@ Pair = tuple[Labels | None, Labels | None]
 
 @dataclass(frozen=True)
 class Change:
-    """What changes in a folder.
+    """What changes in a folder: the labels of files, and whether this takes the last
+    change back."""
 
-    Attributes:
-        number: the same in all folders of the change.
-        folders: of the change; "." is this one. The first one's journal decides.
-        labels: {file: its labels before and after}.
-        undo: whether it takes the last change back.
-    """
-
-    number: str = ""
-    folders: Sequence[str] = ()
     labels: dict[str, Pair] = field(default_factory=dict)
     undo: bool = False
-
-    def places(self, folder: Path) -> list[Path]:
-        """The folders of the change, which is noted in one of them."""
-        return [folder / name for name in self.folders]
 
 
 def save(
@@ -187,17 +174,13 @@ def alone(folders: Iterable[Path]) -> Iterator[None]:
     Raises:
         InputError: another program changes them, or a change cannot be finished.
     """
-    waiting = sorted({folder.absolute() for folder in folders})
-    locked: list[Path] = []
     with ExitStack() as stack:
-        for folder in waiting:  # the other folders of a change are added on the way
-            if folder not in locked:
-                stack.enter_context(_locked(folder))
-                locked.append(folder)
-                remove_leftovers(folder)
-                change = _noted(folder)
-                waiting += change.places(folder) if change else []
-        for folder in locked:
+        for folder in sorted(set(folders)):
+            with suppress(OSError):  # Windows opens no folder; others name what fails
+                handle = os.open(folder, os.O_RDONLY)
+                stack.callback(os.close, handle)
+                _lock(handle, folder)
+            remove_leftovers(folder)
             with about(f"{folder}: a change of labels was interrupted"):
                 finished = len(_finish(folder))
             if finished:
@@ -208,78 +191,42 @@ def alone(folders: Iterable[Path]) -> Iterator[None]:
         yield
 
 
-@contextmanager
-def _locked(folder: Path) -> Iterator[None]:
-    """Lock a folder, if the system can."""
-    with ExitStack() as stack:
-        with suppress(OSError):  # Windows opens no folder; a missing one is named later
-            handle = os.open(folder, os.O_RDONLY)
-            stack.callback(os.close, handle)
-            _lock(handle, folder)
-        yield
-
-
 def _lock(handle: int, folder: Path) -> None:
     """Wait for other programs, and lock a folder.
 
     Raises:
         InputError: another program takes long.
     """
-    latest = time.monotonic() + PATIENCE_S
-    while True:
-        try:
+    for _ in range(LOOKS):
+        with suppress(BlockingIOError):
             return lock(handle)
-        except BlockingIOError:
-            if time.monotonic() > latest:
-                raise InputError(
-                    f"{folder}: another program is changing labels here; try again when "
-                    "it has ended"
-                ) from None
         time.sleep(LOOK_S)
+    raise InputError(
+        f"{folder}: another program is changing labels here; try again when it has ended"
+    )
 
 
-def _noted(folder: Path, name: str = JOURNAL) -> Change | None:
-    """The change that a file of a folder tells of.
+def _noted(note: Path) -> Change:
+    """The change that a file tells of; an empty one without the file.
 
     Raises:
         InputError: the file is damaged.
     """
-    note = folder / name
     if not note.is_file():
-        return None
+        return Change()
     entries = parse_json(read_text(note), str(note))
     with parsing(str(note), "a change of labels", "; delete it"):
         change = Change(**entries)
-        change.places(folder)[0].is_dir()
         labels = {Path(file).name: (a, b) for file, (a, b) in change.labels.items()}
     return replace(change, labels=labels)
 
 
 def _finish(folder: Path) -> list[Path]:
-    """Carry out, in all its folders, the change that is noted in a folder, if one is;
-    the recordings that it changed."""
-    change = _noted(folder)
-    if change is None:
-        return []
-    of_change: dict[Path, Change] = {}
-    for place in change.places(folder):
-        noted = _noted(place)
-        if noted and noted.number == change.number:
-            of_change[place] = noted
-    if change.places(folder)[0] not in of_change:
-        (folder / JOURNAL).unlink()
-        return []
+    """Do what a folder's journal says, if there is one, as far as it is not done yet;
+    the recordings that changed."""
     changed = []
-    # The journal that decides is the last to go.
-    for place, noted in reversed(of_change.items()):
-        changed += _carry_out(place, noted)
-    return changed
-
-
-def _carry_out(folder: Path, change: Change) -> list[Path]:
-    """Do what a folder's journal says, as far as it is not done yet; the recordings that
-    changed."""
-    changed = []
+    journal = folder / JOURNAL
+    change = _noted(journal)
     for file, (before, after) in change.labels.items():
         path = folder / file
         way = [path, folder / DELETED / file]
@@ -296,22 +243,19 @@ def _carry_out(folder: Path, change: Change) -> list[Path]:
             changed.append(path)
     if change.undo:
         (folder / UNDO).unlink(missing_ok=True)
-        (folder / JOURNAL).unlink()
-    else:
-        (folder / JOURNAL).replace(folder / UNDO)
+        journal.unlink()
+    elif change.labels:
+        journal.replace(folder / UNDO)
     return changed
 
 
 def _begin(changes: Mapping[Path, Change]) -> list[Path]:
     """Note what changes in each folder, and carry it out; the recordings that changed."""
-    number = os.urandom(8).hex()
-    folders = list(changes)
-    for folder in reversed(folders):
-        names = ["." if place == folder else str(place) for place in folders]
-        change = replace(changes[folder], number=number, folders=names)
-        with write_whole(folder / JOURNAL) as file:
+    with ExitStack() as stack:  # all journals get their names one just after another
+        for folder, change in changes.items():
+            file = stack.enter_context(write_whole(folder / JOURNAL))
             file.write(json.dumps(vars(change)).encode())
-    return _finish(folders[0])
+    return [path for folder in changes for path in _finish(folder)]
 
 
 def change_all(changes: Mapping[Path, Labels | None]) -> None:
@@ -325,7 +269,7 @@ def change_all(changes: Mapping[Path, Labels | None]) -> None:
     """
     of_folder: dict[Path, Change] = {}
     for path in changes:
-        change = of_folder.setdefault(path.parent.absolute(), Change())
+        change = of_folder.setdefault(path.parent, Change())
         change.labels[path.name] = load(path).labels, changes[path]
     for folder in of_folder:
         with refusing(f"{folder}: its recordings cannot be changed"):
@@ -345,15 +289,14 @@ def take_back(folders: Iterable[Path]) -> list[Path]:
         InputError: by now, another recording has the name of a deleted one.
     """
     back: dict[Path, Change] = {}
-    for folder in map(Path.absolute, folders):
-        change = _noted(folder, UNDO)
-        if change is None:
-            continue
-        for file, (_, after) in change.labels.items():
+    for folder in folders:
+        labels = {}
+        for file, (before, after) in _noted(folder / UNDO).labels.items():
+            labels[file] = after, before
             if after is None and (folder / file).exists():
                 raise InputError(
                     f"{folder / file}: exists again; rename it, and undo then"
                 )
-        labels = {file: pair[::-1] for file, pair in change.labels.items()}
-        back[folder] = replace(change, labels=labels, undo=True)
-    return _begin(back) if back else []
+        if labels:
+            back[folder] = Change(labels, undo=True)
+    return _begin(back)

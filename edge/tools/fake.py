@@ -52,7 +52,6 @@ def run(arguments: argparse.Namespace) -> int:
     output = Output.of(arguments)
     folder = arguments.out / "touches"
     rest = arguments.out / "still.npz"
-    remove_leftovers(arguments.out)
     remove_leftovers(folder)
     save(rest, still(file, STILL_S))
     paths = []

@@ -47,6 +47,7 @@ def description(info: ModelInfo, about: dict[str, Any]) -> str:
     """The description for a person."""
     named = f"{info.name} " if info.name else ""
     size = f"{about['bytes'] / 1024:.0f} kB, format {about['format']}"
+    size += "" if about["digest"] else ", no digest"
     lines = [f"{about['file']}: {named}{about['version']}, {size}", ""]
     for name, task in info.tasks.items():
         lines += wrapped(
@@ -68,11 +69,6 @@ def description(info: ModelInfo, about: dict[str, Any]) -> str:
         lines += wrapped(worth_text(info.remoteness.task, info.remoteness.worth))
     for sentence in _origin(info):
         lines += wrapped(sentence)
-    if not about["digest"]:
-        lines += wrapped(
-            "It has no digest, as it was made by an earlier version: damage to the file "
-            "may go unnoticed."
-        )
     return "\n".join(lines)
 
 

@@ -123,7 +123,7 @@ def test_a_change_that_was_finished_later_can_be_taken_back(new_days, dies, capl
 
 @pytest.mark.parametrize("words", [["--set", "object=cup", "--yes"], ["--undo"]])
 def test_two_programs_do_not_change_one_folder(new_days, words, refused, monkeypatch):
-    monkeypatch.setattr(saving, "PATIENCE_S", 0.0)
+    monkeypatch.setattr(saving, "LOOKS", 1)
     day, _ = new_days()
     with alone([day]):
         assert "another program is changing labels here" in refused(
@@ -133,7 +133,7 @@ def test_two_programs_do_not_change_one_folder(new_days, words, refused, monkeyp
 
 
 def test_a_reader_waits_for_a_change_that_is_under_way(new_days, monkeypatch):
-    monkeypatch.setattr(saving, "PATIENCE_S", 0.0)
+    monkeypatch.setattr(saving, "LOOKS", 1)
     day, _ = new_days()
     with alone([day]):
         find([str(day)])

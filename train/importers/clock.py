@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from edge.commands.output import counted
 from edge.errors import InputError
+from train.progress import say
 
 JITTER_STEPS = 0.5
 """A time may go back by so many of the usual steps."""
@@ -124,3 +125,24 @@ def angles_at(
     unknown = (across_s > gap_s * (1.0 + 1e-9)) | (outside_s > HOLD_S * (1.0 + 1e-9))
     at_frames[unknown] = np.nan
     return at_frames
+
+
+def complete(angles: NDArray[np.float64], where: str) -> NDArray[np.float64]:
+    """Joint angles (n, dof) that are NaN in each frame that lacks one; says how many do.
+
+    Raises:
+        InputError: all frames lack one.
+    """
+    unknown = ~np.isfinite(angles).all(axis=1)
+    angles[unknown] = np.nan
+    if unknown.all():
+        raise InputError(
+            f"{where} has no joint angle at the time of any frame; record both with one "
+            "clock"
+        )
+    if unknown.any():
+        say(
+            f"{where} lacks joint angles for {int(unknown.sum())} of {len(angles)} "
+            "frames, where they are unknown"
+        )
+    return angles

@@ -254,8 +254,11 @@ def _grids(*names: str) -> list[tuple[list[str], tuple[int, ...]]]:
         shape = group.max() - low + 1
         is_grid = len(group) == len(group.drop_duplicates()) == shape.prod()
         if is_grid and low["first"] <= 1:
-            ordered = group.sort_values(["first", "second"]).index
-            grids.append((list(ordered), () if flat else tuple(shape.tolist())))
+            ordered = list(group.sort_values(["first", "second"]).index)
+            # pandas names the columns of one name s, s.1, s.2.
+            stem = ordered[0].removesuffix(".1")
+            first = [stem] if stem in names and stem != ordered[0] else []
+            grids.append((first + ordered, () if flat else tuple(shape.tolist())))
     return grids
 
 

@@ -326,16 +326,15 @@ def _header(text: _Text) -> _Header:
 
 
 def _stated(text: _Text) -> _Header:
-    """The names as they stand."""
+    """The names as they stand; a row of numbers and empty cells has none."""
     cells = _names(text.rows[0])
-    if not all(map(_is_number, cells)):
-        return _Header(cells, True, 1)
+    numbers = [_is_number(cell) for cell in cells if cell]
     above = [text.comment.lstrip("#% ")]
     _, heading = next(_rows(above, text.mark))
     heading = _names(heading)
-    if len(heading) == len(cells) and not _is_number(heading[0]):
+    if any(numbers) and len(heading) == len(cells) and not _is_number(heading[0]):
         return _Header(heading, True, 0)
-    return _without_names(text)
+    return _without_names(text) if all(numbers) else _Header(cells, True, 1)
 
 
 def _is_number(text: str) -> bool:
@@ -394,7 +393,10 @@ def _cells(text: _Text, header: _Header, **options: Any) -> pd.DataFrame:
 def _named(table: pd.DataFrame, header: _Header) -> pd.DataFrame:
     """The columns by their names, without those that have neither a name nor a
     value."""
-    filled = [i for i in table if header.names[i] or table[i].notna().any()]
+    # Without a header, a sign at the ends of the rows makes an empty column.
+    last = len(header.names) - 1
+    named = [i for i in table if header.names[i] and (header.named or i < last)]
+    filled = [i for i in table if i in named or table[i].notna().any()]
     return table[filled].set_axis([header.unique[i] for i in filled], axis=1)
 
 

@@ -32,4 +32,4 @@ def test_a_person_gets_sentences(edge, monkeypatch):
 @pytest.mark.parametrize("digest", [True, False])
 def test_a_model_without_a_digest_is_said_to_have_none(digest):
     about = {**described(Model(demo.MODEL)), "digest": digest}
-    assert ("It has no digest" in description(INFO, about)) != digest
+    assert ("no digest" in description(INFO, about)) != digest

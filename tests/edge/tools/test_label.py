@@ -44,7 +44,7 @@ def test_a_label_that_would_act_on_a_terminal_is_counted_as_an_escape(a, edge):
     change_all({a: {"object": "\x1b[2J"}})
     status, _, err = edge("label", a)
     assert status == 0
-    assert err.endswith("object (1 of 1): [2J 1\n")
+    assert err.endswith("object (1 of 1): _[2J 1\n")
     assert "\x1b" not in err
 
 
