@@ -82,6 +82,7 @@ class Model:
         info: its metadata.
         version: the first eight digits of the file's SHA-256.
         engine: the program that runs the graph, one of `edge.model.engines.ENGINES`.
+        outputs: {output of the graph: its type, and its shape for one vector}.
 
     Raises:
         InputError: the file is missing, is not an exported model, or contradicts
@@ -112,7 +113,7 @@ class Model:
         # number.
         self.info = from_json(text, name)
         onnx_file.check(self.contents, name)
-        self._outputs = _outputs(self.info)
+        self.outputs = _outputs(self.info)
         self._engine = open_engine(name, self.contents, engine)
         self.engine = self._engine.name
         self._check()
@@ -124,7 +125,7 @@ class Model:
 
     def _check(self) -> None:
         """Refuse a graph whose inputs and outputs are not those of its metadata."""
-        expected = {"features": ("tensor(double)", [self.info.width]), **self._outputs}
+        expected = {"features": ("tensor(double)", [self.info.width]), **self.outputs}
         if self.info.decision_points_s:
             expected["decision_point"] = "tensor(int64)", []
         declared = {**self._engine.inputs, **self._engine.outputs}
@@ -197,12 +198,12 @@ class Model:
         if self.info.decision_points_s:
             inputs["decision_point"] = np.array([point], dtype=np.int64)
         try:
-            values = self._engine.run(list(self._outputs), inputs)
+            values = self._engine.run(list(self.outputs), inputs)
         # An index past its tensor, or shapes that do not match.
         except Exception as error:
             raise self._broken(printable(str(error))) from None
-        outputs = dict(zip(self._outputs, values, strict=True))
-        for name, (_, shape) in self._outputs.items():
+        outputs = dict(zip(self.outputs, values, strict=True))
+        for name, (_, shape) in self.outputs.items():
             if outputs[name].shape != (len(vectors), *shape):
                 raise self._broken(f"{name} has the shape {outputs[name].shape}")
         return outputs

@@ -83,7 +83,7 @@ class Chain:
         self.limits = tuple(joint.limits for joint in moving)
         """(lower, upper) of each moving joint in radians, or metres if it slides; or
         None."""
-        self._links = [
+        self.links = [
             (
                 joint.kind,
                 _direction(joint),
@@ -92,7 +92,7 @@ class Chain:
             )
             for joint in self.joints
         ]
-        """Of each joint: its kind, its axis of length 1, the fixed steps before and
+        """Of each joint: its kind, its axis of length 1, the fixed steps before (3, 4) and
         after it."""
 
     def pose(self, q: ArrayLike) -> Floats:
@@ -128,7 +128,7 @@ class Chain:
         """
         x, y, z, w = position
         remaining = reversed(angles)
-        for kind, (kx, ky, kz), step, (dx, dy, dz) in reversed(self._links):
+        for kind, (kx, ky, kz), step, (dx, dy, dz) in reversed(self.links):
             x = x + dx * w
             y = y + dy * w
             z = z + dz * w

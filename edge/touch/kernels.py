@@ -126,7 +126,7 @@ def _samples_of_bias(biases: int) -> Integers:
 
 
 @lru_cache
-def _mixes(channels: int) -> NDArray[np.float32]:
+def mixes(channels: int) -> NDArray[np.float32]:
     """(convolutions, channels) 1 where a convolution takes a channel.
 
     Python promises that `random` gives the same numbers in every version.
@@ -152,7 +152,7 @@ def convolved(channels: NDArray[np.int32]) -> NDArray[np.int32]:
     """(convolutions, samples) results of `shifted` channels (c, samples)."""
     # Sums of nine such numbers are below 2^18: float32 holds them exactly, whatever the
     # order.
-    mixed = (_mixes(len(channels)) @ channels.astype(np.float32)).astype(np.int32)
+    mixed = (mixes(len(channels)) @ channels.astype(np.float32)).astype(np.int32)
     mixed = mixed.reshape(len(DILATIONS), len(WEIGHTS), SAMPLES)
     results = np.empty_like(mixed)
     for dilation, rows, result in zip(DILATIONS, mixed, results, strict=True):

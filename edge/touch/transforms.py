@@ -26,7 +26,7 @@ def length_floor(layout: SkinLayout) -> float:
     return MOTION_FLOOR * layout.pitch[0]
 
 
-def _floor(feature: Feature, layout: SkinLayout) -> float:
+def floor_of(feature: Feature, layout: SkinLayout) -> float:
     if feature.quantity in FORCES:
         return force_floor(layout)
     if feature.quantity in ("motion", "force_motion"):
@@ -41,7 +41,7 @@ def transformed(
 ) -> Array:
     """Samples (rows, times) after the transforms of their features, which are of one
     kind."""
-    floors = np.array([[_floor(feature, layout)] for feature in group])
+    floors = np.array([[floor_of(feature, layout)] for feature in group])
     first = group[0]
     for transform in first.transforms:
         values = _transformed(values, transform, floors, first.wide)

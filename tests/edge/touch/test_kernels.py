@@ -47,7 +47,7 @@ def by_hand(channels, table):
     rows = []
     for row, shift in zip(channels.tolist(), table.shifts, strict=True):
         rows.append([moved(value, shift) for value in row])
-    mixes = kernels._mixes(len(rows)).astype(bool).tolist()
+    mixes = kernels.mixes(len(rows)).astype(bool).tolist()
     convolutions = convolution_of_bias(len(table.biases)).tolist()
     counts = []
     for bias, convolution in zip(table.biases, convolutions, strict=True):
@@ -89,7 +89,7 @@ def test_every_share_is_that_of_aeon_s_minirocket_with_the_same_kernels(
     table = KernelTable(
         (2,) * channels, tuple(rng.integers(-(1 << 15), 1 << 15, biases).tolist())
     )
-    mixes = kernels._mixes(channels)
+    mixes = kernels.mixes(channels)
     parameters = (
         mixes.sum(axis=1).astype(np.int32),
         np.nonzero(mixes)[1].astype(np.int32),
@@ -114,14 +114,14 @@ def test_the_largest_values_stay_exact():
 
 
 def test_a_convolution_takes_one_to_nine_channels_the_same_on_every_machine():
-    mixes = kernels._mixes(32)
+    mixes = kernels.mixes(32)
     assert set(mixes.sum(axis=1).tolist()) == {1, 2, 3, 4, 6, 9}
     assert np.flatnonzero(mixes[3]).tolist() == [1, 13, 16, 20, 23, 27]
-    assert (kernels._mixes(1) == 1).all()
+    assert (kernels.mixes(1) == 1).all()
     # A model stores none of them: other draws would change the features of a stored
     # model.
     assert (
-        zlib.crc32(np.packbits(kernels._mixes(20).astype(bool)).tobytes()) == 1077911594
+        zlib.crc32(np.packbits(kernels.mixes(20).astype(bool)).tobytes()) == 1077911594
     )
 
 

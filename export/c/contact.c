@@ -1,0 +1,218 @@
+/* One contact, frame by frame: edge/touch/track.py, contact.py, layout.py, arm.py. */
+#include "internal.h"
+
+#define TAXELS (EC_ROWS * EC_COLS)
+#define CLOCK_ROUNDING_S 1e-6
+
+ec_contact ec_now; /* the contact that is followed */
+static ec_set active;
+static ec_region region;
+
+static bool finite(double x) { return x - x == 0.0; }
+
+bool ec_released(double touched_s, double now_s) {
+  return now_s - touched_s >= EC_RELEASE_S - CLOCK_ROUNDING_S;
+}
+
+/* A point of the skin in the frame of its link. */
+static void skin_point(double row, double col, double point[3]) {
+#if EC_CYLINDER
+#if EC_COLUMN_ANGLES
+  uint32_t column = (uint32_t)col;
+  const ec_angle *place = &ec_angles[column % EC_COLS];
+  double angle = (place->angle_deg + (col - column) * place->step_deg) * EC_RADIANS;
+#else
+  double angle = EC_TURN * col / EC_COLS;
+#endif
+  point[0] = EC_RADIUS_M * ec_cos(angle);
+  point[1] = EC_RADIUS_M * ec_sin(angle);
+  point[2] = EC_ROW0_Z_M - row * EC_ALONG;
+#else
+  point[0] = col * EC_AROUND;
+  point[1] = row * EC_ALONG;
+  point[2] = 0.0;
+#endif
+}
+
+#if EC_DOF
+/* The point in the frame of the arm's base. */
+static void carried(const double *joints, double p[3]) {
+  uint32_t moving = EC_DOF;
+  for (const ec_link *link = ec_links + EC_LINKS; link-- > ec_links;) {
+    const double *k = link->axis;
+    const double *step = link->step;
+    for (uint32_t i = 0; i < 3; i++) p[i] = p[i] + link->after[i];
+    if (link->kind == EC_PRISMATIC) {
+      double travel = joints[--moving];
+      for (uint32_t i = 0; i < 3; i++) p[i] = p[i] + k[i] * travel;
+    } else if (link->kind == EC_REVOLUTE) {
+      double angle = joints[--moving];
+      double half = ec_sin(0.5 * angle);
+      double f = ec_sin(angle);
+      double g = 2.0 * half * half;
+      double ax = k[1] * p[2] - k[2] * p[1];
+      double ay = k[2] * p[0] - k[0] * p[2];
+      double az = k[0] * p[1] - k[1] * p[0];
+      p[0] = p[0] + (f * ax + g * (k[1] * az - k[2] * ay));
+      p[1] = p[1] + (f * ay + g * (k[2] * ax - k[0] * az));
+      p[2] = p[2] + (f * az + g * (k[0] * ay - k[1] * ax));
+    }
+    double x = p[0];
+    double y = p[1];
+    double z = p[2];
+    for (uint32_t i = 0; i < 3; i++, step += 4) {
+      p[i] = step[0] * x + step[1] * y + step[2] * z + step[3];
+    }
+  }
+}
+#endif
+
+/* Distance from where this centroid was first seen; not a number without a pose. */
+static double distance(ec_start *start, double row, double col, const double *joints) {
+  double p[3];
+  skin_point(row, col, p);
+#if EC_DOF
+  if (!joints) {
+    ec_now.missing_pose = true;
+    return EC_NAN;
+  }
+  carried(joints, p);
+#else
+  (void)joints;
+#endif
+  if (!start->known) {
+    start->known = true;
+    for (uint32_t i = 0; i < 3; i++) start->point[i] = p[i];
+  }
+  double x = p[0] - start->point[0];
+  double y = p[1] - start->point[1];
+  double z = p[2] - start->point[2];
+  return ec_sqrt(x * x + y * y + z * z);
+}
+
+static bool any_finite(uint32_t which) {
+  for (uint32_t i = 0; i < ec_now.rows; i++) {
+    if (finite(ec_now.row[i].motions[which])) return true;
+  }
+  return false;
+}
+
+/* Of two readings of one instant the later one counts. */
+static void forget_last(void) {
+  ec_now.rows--;
+  for (uint32_t i = 0; i < 2; i++) {
+    if (!any_finite(i)) ec_now.starts[i].known = false;
+  }
+}
+
+static void move(ec_row *row, bool touched, const double *joints) {
+  for (uint32_t i = 0; i < 2; i++) {
+    row->motions[i] = !touched && ec_now.rows ? ec_now.row[ec_now.rows - 1].motions[i] : 0.0;
+  }
+  if (!touched) return;
+#if EC_MOTION
+  int64_t rows;
+  int64_t cols;
+  ec_sums(&region, &rows, &cols);
+  double area = region.area;
+  row->motions[0] =
+      distance(&ec_now.starts[0], (double)rows / area, (double)cols / area, joints);
+#endif
+#if EC_FORCE_MOTION
+  double force = (double)row->zones[0][2];
+  double col = (double)row->zones[0][4] / force;
+  if (col >= EC_COLS) col -= EC_COLS;
+  row->motions[1] = distance(&ec_now.starts[1], (double)row->zones[0][3] / force, col, joints);
+#endif
+  (void)joints;
+}
+
+/* The sums of the skin's cells. */
+static void pool(
+    const uint16_t *counts, const bool *valid, const int16_t *cell_of_taxel, uint32_t *cells,
+    uint32_t size) {
+  for (uint32_t i = 0; i < size; i++) cells[i] = 0;
+  for (uint32_t i = 0; i < TAXELS; i++) {
+    if (cell_of_taxel[i] >= 0 && (!valid || valid[i])) cells[cell_of_taxel[i]] += counts[i];
+  }
+}
+
+static int add(const uint16_t *counts, const bool *valid, const double *joints, double age_s,
+               bool touched) {
+  if (ec_now.rows && age_s <= ec_now.age_s) {
+    age_s = ec_now.age_s;
+    forget_last();
+  }
+  if (ec_now.rows == EC_FRAMES) return EC_TOO_FAST;
+  for (uint32_t i = 0; valid && i < TAXELS; i++) {
+    if (!valid[i] && ec_alive[i]) ec_now.missing_taxels = true;
+  }
+  ec_row *row = &ec_now.row[ec_now.rows];
+  row->t = age_s;
+  row->peak = touched ? region.peak : 0;
+  row->area = touched ? region.area : 0;
+  if (touched) ec_now.region = region;
+#if EC_ZONES
+  for (uint32_t i = 0; i < EC_ZONES; i++) {
+    for (uint32_t j = 0; j < EC_ZONE_WIDTH; j++) row->zones[i][j] = 0;
+    if (touched) ec_zone((ec_zone_name)ec_zone_names[i], active, &region, counts, row->zones[i]);
+  }
+#endif
+  move(row, touched, joints);
+#if EC_CELLS
+  pool(counts, valid, ec_cell_of_taxel, row->cells, EC_CELLS);
+#endif
+#if EC_KERNEL_CELLS
+  pool(counts, valid, ec_kernel_cell_of_taxel, row->kernel_cells, EC_KERNEL_CELLS);
+#endif
+#if EC_JOINTS
+  for (uint32_t i = 0; i < EC_JOINTS; i++) row->joints[i] = joints ? joints[i] : EC_NAN;
+  if (!joints) ec_now.missing_pose = true;
+#endif
+  (void)pool;
+  ec_now.rows++;
+  ec_now.age_s = age_s;
+  return 0;
+}
+
+static void begin(double t) {
+  ec_now.under_way = true;
+  ec_now.ended = false;
+  ec_now.onset_s = t;
+  ec_now.age_s = 0.0;
+  ec_now.touched_s = 0.0;
+  ec_now.frames = 0;
+  ec_now.rows = 0;
+  ec_now.missing_taxels = false;
+  ec_now.missing_pose = false;
+  for (uint32_t i = 0; i < 2; i++) ec_now.starts[i].known = false;
+}
+
+/* Take a frame into the contact, and end it where it is over. */
+int ec_follow(const uint16_t *counts, const bool *valid, double t, const double *joints) {
+  static const ec_set nothing;
+  int error = 0;
+  if (ec_now.ended) ec_now.under_way = ec_now.ended = false;
+  ec_active(counts, valid, active);
+  const bool *former = ec_now.under_way ? ec_now.region.taxels : nothing;
+  bool touched = ec_largest(active, counts, former, &region);
+  bool above = touched && region.peak > EC_ONSET;
+  if (!ec_now.under_way) {
+    if (!above) return 0;
+    begin(t);
+  }
+  double age_s = t - ec_now.onset_s;
+  bool confirmed = ec_now.frames >= EC_DEBOUNCE;
+  if (!confirmed && !above) {
+    ec_now.ended = true;
+    return 0;
+  }
+  ec_now.frames++;
+  if (!confirmed || ec_now.age_s < EC_WINDOW_S) error = add(counts, valid, joints, age_s, touched);
+  if (touched) {
+    ec_now.touched_s = age_s;
+  } else if (ec_released(ec_now.touched_s, age_s)) {
+    ec_now.ended = true;
+  }
+  return error;
+}

@@ -1,0 +1,179 @@
+/* The exported graph, as edge/model/graph.py computes it, for one vector. All that decides is made
+   of whole numbers below 2^53, so that the order of sums changes no bit. */
+#include "internal.h"
+
+double ec_arena[EC_ARENA];
+
+static uint32_t now; /* the decision point */
+
+typedef struct {
+  const double *values; /* NULL of a table */
+  const ec_table *table;
+} operand;
+
+static operand operand_at(uint32_t place) {
+  operand x = {0, 0};
+  if (place < EC_ARENA) {
+    x.values = ec_arena + place;
+  } else {
+    x.table = &ec_tables[place - EC_ARENA];
+  }
+  return x;
+}
+
+static double at(operand x, uint32_t i) {
+  if (x.values) return x.values[i];
+  if (x.table->by_point) i += now * x.table->size;
+  switch (x.table->type) {
+    case EC_INT8: return ((const int8_t *)x.table->data)[i];
+    case EC_INT16: return ((const int16_t *)x.table->data)[i];
+    case EC_INT32: return ((const int32_t *)x.table->data)[i];
+    case EC_FLOAT: return (double)((const float *)x.table->data)[i];
+    default: return ((const double *)x.table->data)[i];
+  }
+}
+
+static double combined(uint8_t operator, double a, double b) {
+  switch (operator) {
+    case EC_ADD: return a + b;
+    case EC_SUB: return a - b;
+    case EC_MUL: return a * b;
+    case EC_DIV: return a / b;
+    case EC_MAX: return a > b || a != a ? a : b;
+    default: return a <= b ? 1.0 : 0.0;
+  }
+}
+
+/* sizes: of the output; of the inputs, each as many or 1. */
+static void element_wise(const ec_step *step) {
+  operand a = operand_at(step->inputs[0]);
+  operand b = operand_at(step->inputs[1]);
+  operand c = operand_at(step->inputs[2]);
+  double *out = ec_arena + step->outputs[0];
+  for (uint32_t i = 0; i < step->sizes[0]; i++) {
+    uint32_t ia = step->sizes[1] > 1 ? i : 0;
+    uint32_t ib = step->sizes[2] > 1 ? i : 0;
+    uint32_t ic = step->sizes[3] > 1 ? i : 0;
+    double x = at(a, ia);
+    switch (step->operator) {
+      case EC_WHERE: x = x != 0.0 ? at(b, ib) : at(c, ic); break;
+      case EC_CLIP: {
+        double low = at(b, ib);
+        double high = at(c, ic);
+        x = x < low ? low : x > high ? high : x;
+        break;
+      }
+      case EC_ROUND: x = ec_rint(x); break;
+      case EC_SQRT: x = ec_sqrt(x); break;
+      default: x = combined(step->operator, x, at(b, ib));
+    }
+    out[i] = x;
+  }
+}
+
+/* x (n) times a matrix (n, m), plus m numbers where there is a third input. */
+static void gemm(const ec_step *step) {
+  operand x = operand_at(step->inputs[0]);
+  operand matrix = operand_at(step->inputs[1]);
+  operand plus = operand_at(step->inputs[2]);
+  double *out = ec_arena + step->outputs[0];
+  uint32_t n = step->sizes[0];
+  uint32_t m = step->sizes[1];
+  for (uint32_t j = 0; j < m; j++) out[j] = 0.0;
+  for (uint32_t i = 0; i < n; i++) {
+    double factor = at(x, i);
+    for (uint32_t j = 0; j < m; j++) out[j] += factor * at(matrix, i * m + j);
+  }
+  for (uint32_t j = 0; step->sizes[2] && j < m; j++) out[j] += at(plus, j);
+}
+
+/* sizes: before the axis, along it, behind it. */
+static void reduce(const ec_step *step) {
+  operand x = operand_at(step->inputs[0]);
+  double *out = ec_arena + step->outputs[0];
+  uint32_t along = step->sizes[1];
+  uint32_t behind = step->sizes[2];
+  for (uint32_t i = 0; i < step->sizes[0] * behind; i++) {
+    double sum = 0.0;
+    for (uint32_t j = 0; j < along; j++) {
+      double value = at(x, (i / behind * along + j) * behind + i % behind);
+      if (step->operator == EC_REDUCEL1 && value < 0.0) value = -value;
+      if (step->operator == EC_REDUCESUMSQUARE) value *= value;
+      sum += value;
+    }
+    out[i] = step->operator == EC_REDUCEMEAN ? sum / along : sum;
+  }
+}
+
+/* The k smallest of each row, in order, and their places; of equal ones the first comes first. */
+static void top_k(const ec_step *step) {
+  operand x = operand_at(step->inputs[0]);
+  uint32_t k = step->sizes[2];
+  for (uint32_t row = 0; row < step->sizes[0]; row++) {
+    double *values = ec_arena + step->outputs[0] + row * k;
+    double *places = ec_arena + step->outputs[1] + row * k;
+    uint32_t count = 0;
+    for (uint32_t i = 0; i < step->sizes[1]; i++) {
+      double value = at(x, row * step->sizes[1] + i);
+      if (count == k && !(value < values[k - 1])) continue;
+      uint32_t place = count < k ? count++ : k - 1;
+      for (; place > 0 && value < values[place - 1]; place--) {
+        values[place] = values[place - 1];
+        places[place] = places[place - 1];
+      }
+      values[place] = value;
+      places[place] = i;
+    }
+  }
+}
+
+/* sizes: before the axis, along it, behind it; indices. Those below 0 count from the end. */
+static void gather(const ec_step *step) {
+  operand x = operand_at(step->inputs[0]);
+  operand indices = operand_at(step->inputs[1]);
+  double *out = ec_arena + step->outputs[0];
+  uint32_t along = step->sizes[1];
+  uint32_t behind = step->sizes[2];
+  for (uint32_t i = 0; i < step->sizes[0]; i++) {
+    for (uint32_t j = 0; j < step->sizes[3]; j++) {
+      double index = at(indices, j);
+      uint32_t place = (uint32_t)(index < 0.0 ? index + along : index);
+      for (uint32_t l = 0; l < behind; l++) *out++ = at(x, (i * along + place) * behind + l);
+    }
+  }
+}
+
+static void pad(const ec_step *step) {
+  operand x = operand_at(step->inputs[0]);
+  double *out = ec_arena + step->outputs[0];
+  for (uint32_t i = 0; i < step->sizes[0]; i++) out[i] = at(x, i);
+  out[step->sizes[0]] = at(operand_at(step->inputs[1]), 0);
+}
+
+static void arg_max(const ec_step *step) {
+  operand x = operand_at(step->inputs[0]);
+  uint32_t best = 0;
+  for (uint32_t i = 1; i < step->sizes[0]; i++) {
+    if (at(x, i) > at(x, best)) best = i;
+  }
+  ec_arena[step->outputs[0]] = best;
+}
+
+void ec_graph(uint32_t point) {
+  now = point;
+  for (const ec_step *step = ec_steps; step < ec_steps + EC_STEPS; step++) {
+    if (!(step->points >> point & 1)) continue;
+    switch (step->operator) {
+      case EC_GEMM: gemm(step); break;
+      case EC_REDUCEL1:
+      case EC_REDUCESUM:
+      case EC_REDUCESUMSQUARE:
+      case EC_REDUCEMEAN: reduce(step); break;
+      case EC_TOPK: top_k(step); break;
+      case EC_GATHER: gather(step); break;
+      case EC_PAD: pad(step); break;
+      case EC_ARGMAX: arg_max(step); break;
+      default: element_wise(step);
+    }
+  }
+}

@@ -1,0 +1,215 @@
+/* What the rooms share. Data flows one way: region, contact, features, graph, decide. */
+#ifndef EC_INTERNAL_H
+#define EC_INTERNAL_H
+
+#include <float.h>
+#include <math.h>
+#include <stdbool.h>
+#include <stdint.h>
+
+#include "edge_classify.h"
+
+/* A sum must not be fused with its product, or the bits would be others: compile with
+   -ffp-contract=off. */
+#if defined(__FAST_MATH__)
+#error "compile without -ffast-math: the answers would be others"
+#endif
+#if defined(FLT_EVAL_METHOD) && FLT_EVAL_METHOD != 0
+#error "doubles must be computed as doubles, not in wider registers"
+#endif
+
+/* elementary.c: edge/elementary.py */
+double ec_sin(double x);
+double ec_cos(double x);
+double ec_sqrt(double x);
+double ec_log(double x);
+double ec_logistic(double x);
+double ec_rint(double x);
+
+double ec_exp2(int power);
+int ec_exponent(double x);
+
+/* region.c */
+typedef bool ec_set[EC_ROWS * EC_COLS];
+
+typedef struct {
+  uint32_t area;
+  uint16_t peak;
+  ec_set taxels;
+} ec_region;
+
+typedef enum { EC_CONTACT, EC_SKIN, EC_LEFT, EC_RIGHT, EC_NO_ZONE } ec_zone_name;
+#define EC_ZONE_WIDTH 8
+
+void ec_active(const uint16_t *counts, const bool *valid, ec_set active);
+bool ec_largest(
+    const ec_set active, const uint16_t *counts, const ec_set previous, ec_region *region);
+void ec_sums(const ec_region *region, int64_t *rows, int64_t *cols);
+void ec_zone(
+    ec_zone_name zone, const ec_set active, const ec_region *region, const uint16_t *counts,
+    int64_t numbers[EC_ZONE_WIDTH]);
+
+/* contact.c */
+#define EC_NAN ((double)NAN)
+#define EC_AT_LEAST_1(n) ((n) ? (n) : 1)
+
+typedef struct {
+  double t; /* seconds from onset */
+  double motions[2]; /* of the centroid, and of the force-weighted one */
+  int64_t zones[EC_AT_LEAST_1(EC_ZONES)][EC_ZONE_WIDTH];
+  double joints[EC_AT_LEAST_1(EC_JOINTS)];
+  uint32_t cells[EC_AT_LEAST_1(EC_CELLS)];
+  uint32_t kernel_cells[EC_AT_LEAST_1(EC_KERNEL_CELLS)];
+  uint32_t area; /* 0 without contact */
+  uint16_t peak;
+} ec_row;
+
+typedef struct {
+  bool known;
+  double point[3];
+} ec_start;
+
+typedef struct {
+  bool under_way;
+  bool ended;
+  bool missing_taxels;
+  bool missing_pose;
+  double onset_s;
+  double age_s; /* of the last frame taken in */
+  double touched_s; /* when it was last felt */
+  uint32_t frames;
+  uint32_t rows; /* frames that were taken in */
+  ec_region region; /* when it was last seen */
+  ec_start starts[2];
+  ec_row row[EC_FRAMES];
+} ec_contact;
+
+extern ec_contact ec_now;
+int ec_follow(const uint16_t *counts, const bool *valid, double t, const double *joints);
+bool ec_released(double touched_s, double now_s);
+
+/* features.c */
+void ec_vector(double window_s);
+
+/* model.c: the skin and the arm */
+typedef struct {
+  double angle_deg;
+  double step_deg; /* to the next column */
+} ec_angle;
+
+enum { EC_FIXED, EC_REVOLUTE, EC_PRISMATIC };
+
+typedef struct {
+  double axis[3];
+  double step[12]; /* before the motion: the first three rows of a transform */
+  double after[3]; /* the fixed step after it */
+  uint8_t kind;
+} ec_link;
+
+extern const ec_angle ec_angles[];
+extern const ec_link ec_links[];
+extern const bool ec_alive[];
+extern const uint8_t ec_zone_names[];
+extern const int16_t ec_cell_of_taxel[];
+extern const int16_t ec_kernel_cell_of_taxel[];
+
+/* model.c: the features */
+enum {
+  EC_MAX_FORCE, /* of a zone */
+  EC_FORCE,
+  EC_AREA,
+  EC_PRESSURE,
+  EC_ALONG_ROWS,
+  EC_AROUND_COLS,
+  EC_SPREAD_ALONG,
+  EC_SPREAD_AROUND,
+  EC_SLANT,
+  EC_LENGTH,
+  EC_WIDTH_OF_ZONE,
+  EC_STIFFNESS,
+  EC_ZONE_QUANTITIES,
+  EC_REGION_PEAK = EC_ZONE_QUANTITIES,
+  EC_REGION_AREA,
+  EC_CENTROID_MOTION,
+  EC_CENTRE_OF_FORCE_MOTION,
+  EC_TAXEL_FORCE,
+  EC_JOINT_ANGLE,
+  EC_JOINT_CHANGE,
+  EC_TAXEL_KERNELS,
+  EC_ZONE_KERNELS
+};
+enum { EC_NO_TRANSFORM, EC_LOG, EC_ROOT, EC_RELATIVE };
+enum { EC_COURSE, EC_RATE, EC_MEAN, EC_DEVIATION, EC_ROUGHNESS };
+
+typedef struct {
+  double floor; /* of the first transform, where it is a logarithm */
+  uint16_t samples;
+  uint16_t rows; /* cells or joints */
+  uint8_t zone;
+  uint8_t quantity;
+  uint8_t transforms[3];
+  uint8_t summary;
+} ec_feature;
+
+typedef struct {
+  const int8_t *shifts; /* of each channel */
+  const int32_t *biases;
+  const uint8_t *mixes; /* of each convolution: how many channels, and which */
+  uint16_t channels;
+  uint8_t biases_of_dilation[4];
+} ec_kernels;
+
+extern const ec_feature ec_features[];
+extern const ec_kernels ec_taxel_kernels;
+extern const ec_kernels ec_zone_kernels;
+
+/* model.c: the numbers of graph.c, each in the smallest type that holds it exactly. */
+enum { EC_INT8, EC_INT16, EC_INT32, EC_FLOAT, EC_DOUBLE };
+
+typedef struct {
+  const void *data;
+  uint32_t size; /* of one decision point */
+  uint8_t type;
+  uint8_t by_point; /* whether each decision point has numbers of its own */
+} ec_table;
+
+/* A node of the graph. Places below EC_ARENA are in the arena; the others are tables. */
+typedef struct {
+  uint8_t operator;
+  uint16_t points; /* bit i: decision point i needs it */
+  uint32_t inputs[3];
+  uint32_t outputs[2];
+  uint32_t sizes[4];
+} ec_step;
+
+enum {
+  EC_ADD,
+  EC_SUB,
+  EC_MUL,
+  EC_DIV,
+  EC_MAX,
+  EC_LESSOREQUAL,
+  EC_WHERE,
+  EC_CLIP,
+  EC_ROUND,
+  EC_SQRT,
+  EC_GEMM,
+  EC_REDUCEL1,
+  EC_REDUCESUM,
+  EC_REDUCESUMSQUARE,
+  EC_REDUCEMEAN,
+  EC_TOPK,
+  EC_GATHER,
+  EC_PAD,
+  EC_ARGMAX
+};
+
+extern const ec_table ec_tables[];
+extern const ec_step ec_steps[];
+extern const double ec_windows_s[];
+
+/* graph.c: edge/model/graph.py */
+extern double ec_arena[EC_ARENA];
+void ec_graph(uint32_t point);
+
+#endif

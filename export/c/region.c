@@ -1,0 +1,173 @@
+/* The active taxels of a frame, the largest region of them, and the whole numbers of zones:
+   edge/touch/active.py, components.py, grid.py, zones.py. */
+#include "internal.h"
+
+#define TAXELS (EC_ROWS * EC_COLS)
+
+static uint16_t waiting[TAXELS];
+static uint16_t labels[TAXELS]; /* 0: not active or not reached yet */
+
+/* The taxels next to one; the count of them. */
+static uint32_t neighbours(uint32_t taxel, uint32_t beside[4]) {
+  uint32_t row = taxel / EC_COLS;
+  uint32_t col = taxel % EC_COLS;
+  uint32_t count = 0;
+  if (row > 0) beside[count++] = taxel - EC_COLS;
+  if (row + 1 < EC_ROWS) beside[count++] = taxel + EC_COLS;
+  if (col > 0) beside[count++] = taxel - 1;
+  if (col + 1 < EC_COLS) beside[count++] = taxel + 1;
+#if EC_WRAPS
+  if (col == 0) beside[count++] = taxel + EC_COLS - 1;
+  if (col + 1 == EC_COLS) beside[count++] = taxel + 1 - EC_COLS;
+#endif
+  return count;
+}
+
+typedef struct {
+  uint32_t area;
+  uint32_t overlap;
+  uint16_t peak;
+} component;
+
+/* Label the taxels connected to one. */
+static component flood(
+    uint32_t seed, uint16_t label, const ec_set active, const uint16_t *counts,
+    const ec_set previous) {
+  component found = {0, 0, 0};
+  uint32_t left = 0;
+  labels[seed] = label;
+  waiting[left++] = (uint16_t)seed;
+  while (left > 0) {
+    uint32_t taxel = waiting[--left];
+    uint32_t beside[4];
+    found.area++;
+    found.overlap += previous[taxel];
+    if (counts[taxel] > found.peak) found.peak = counts[taxel];
+    for (uint32_t i = neighbours(taxel, beside); i-- > 0;) {
+      if (active[beside[i]] && !labels[beside[i]]) {
+        labels[beside[i]] = label;
+        waiting[left++] = (uint16_t)beside[i];
+      }
+    }
+  }
+  return found;
+}
+
+/* The largest area comes first, then the larger overlap with the region followed so far, then the
+   higher peak, then the lower index. */
+static bool is_before(component a, component b) {
+  if (a.area != b.area) return a.area > b.area;
+  if (a.overlap != b.overlap) return a.overlap > b.overlap;
+  return a.peak > b.peak;
+}
+
+void ec_active(const uint16_t *counts, const bool *valid, ec_set active) {
+  for (uint32_t i = 0; i < TAXELS; i++) {
+    active[i] = counts[i] > EC_THRESHOLD && (!valid || valid[i]);
+  }
+}
+
+bool ec_largest(
+    const ec_set active, const uint16_t *counts, const ec_set previous, ec_region *region) {
+  component best = {0, 0, 0};
+  uint16_t best_label = 0;
+  uint16_t label = 0;
+  for (uint32_t i = 0; i < TAXELS; i++) labels[i] = 0;
+  for (uint32_t i = 0; i < TAXELS; i++) {
+    if (!active[i] || labels[i]) continue;
+    component next = flood(i, ++label, active, counts, previous);
+    if (is_before(next, best)) {
+      best = next;
+      best_label = label;
+    }
+  }
+  region->area = best.area;
+  region->peak = best.peak;
+  for (uint32_t i = 0; i < TAXELS; i++) region->taxels[i] = best.area && labels[i] == best_label;
+  return best.area > 0;
+}
+
+#if EC_WRAPS
+/* The column at which to cut a circle so that the weights' variance is least. */
+static uint32_t best_cut(const int64_t weights[EC_COLS]) {
+  int64_t total = 0;
+  int64_t first = 0;
+  int64_t second = 0;
+  int64_t lowest_col = -1;
+  int64_t highest_col = -1;
+  for (int64_t col = 0; col < EC_COLS; col++) {
+    if (weights[col] == 0) continue;
+    if (lowest_col < 0) lowest_col = col;
+    highest_col = col;
+    total += weights[col];
+    first += col * weights[col];
+    second += col * col * weights[col];
+  }
+  if (2 * (highest_col - lowest_col) <= EC_COLS) return 0;
+  uint32_t best = 0;
+  int64_t lowest = total * second - first * first;
+  for (int64_t col = 0; col < EC_COLS; col++) {
+    if (weights[col] == 0) continue;
+    first += EC_COLS * weights[col];
+    second += EC_COLS * (EC_COLS + 2 * col) * weights[col];
+    int64_t variance = total * second - first * first;
+    if (variance < lowest) {
+      best = (uint32_t)col + 1;
+      lowest = variance;
+    }
+  }
+  return best;
+}
+#endif
+
+/* Sums of rows and of columns over the region's taxels: area times the centroid. */
+void ec_sums(const ec_region *region, int64_t *rows, int64_t *cols) {
+  int64_t areas[EC_COLS] = {0};
+  *rows = 0;
+  *cols = 0;
+  for (uint32_t i = 0; i < TAXELS; i++) {
+    if (!region->taxels[i]) continue;
+    areas[i % EC_COLS]++;
+    *rows += i / EC_COLS;
+    *cols += i % EC_COLS;
+  }
+#if EC_WRAPS
+  uint32_t cut = best_cut(areas);
+  for (uint32_t col = 0; col < cut; col++) *cols += EC_COLS * areas[col];
+#endif
+  *cols %= (int64_t)EC_COLS * region->area;
+}
+
+/* Largest count, taxels, sum of counts, and the sums of counts times row, column, row squared, row
+   times column, column squared. */
+void ec_zone(
+    ec_zone_name zone, const ec_set active, const ec_region *region, const uint16_t *counts,
+    int64_t numbers[EC_ZONE_WIDTH]) {
+  const bool *taxels = zone == EC_CONTACT ? region->taxels : active;
+  uint32_t begin = zone == EC_RIGHT ? EC_COLS / 2 : 0;
+  uint32_t end = zone == EC_LEFT ? EC_COLS / 2 : EC_COLS;
+  uint32_t cut = 0;
+#if EC_WRAPS
+  if (zone == EC_CONTACT || zone == EC_SKIN) {
+    int64_t weights[EC_COLS] = {0};
+    for (uint32_t i = 0; i < TAXELS; i++) weights[i % EC_COLS] += taxels[i] ? counts[i] : 0;
+    cut = best_cut(weights);
+  }
+#endif
+  for (uint32_t i = 0; i < EC_ZONE_WIDTH; i++) numbers[i] = 0;
+  for (uint32_t i = 0; i < TAXELS; i++) {
+    uint32_t col = i % EC_COLS;
+    if (!taxels[i] || col < begin || col >= end) continue;
+    int64_t count = counts[i];
+    int64_t row = i / EC_COLS;
+    int64_t turned = col < cut ? col + EC_COLS : col;
+    if (count > numbers[0]) numbers[0] = count;
+    numbers[1]++;
+    numbers[2] += count;
+    numbers[3] += count * row;
+    numbers[4] += count * turned;
+    numbers[5] += count * row * row;
+    numbers[6] += count * row * turned;
+    numbers[7] += count * turned * turned;
+  }
+}

@@ -1,0 +1,285 @@
+"""A model as C99 for a microcontroller: `model.h` and `model.c` beside the files of
+`export/c`, which hold no number of the model."""
+
+from __future__ import annotations
+
+import os
+import shutil
+from collections.abc import Iterable
+from itertools import pairwise
+from math import pi
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from edge.arrays import Array
+from edge.errors import InputError
+from edge.model.info import ModelInfo
+from edge.model.model import Model
+from edge.touch import measures, transforms
+from edge.touch.cells import KERNEL_CELLS, Cells
+from edge.touch.contact import feature_types
+from edge.touch.feature import Feature
+from edge.touch.kernels import BIASES, mixes
+from edge.touch.layout import SkinLayout
+from edge.touch.zones import Zones
+from export.c_graph import CompiledGraph
+
+ROOMS = Path(__file__).parent / "c"
+LARGEST = 2**63
+"""No product of a frame's sums may reach it."""
+MOST_SUMMED = 128
+"""Samples beyond which numpy sums up in halves."""
+QUANTITIES = {
+    ("contact", "max_force"): "EC_REGION_PEAK",
+    ("contact", "area"): "EC_REGION_AREA",
+    ("contact", "motion"): "EC_CENTROID_MOTION",
+    ("contact", "force_motion"): "EC_CENTRE_OF_FORCE_MOTION",
+    ("skin", "taxel_kernels"): "EC_TAXEL_KERNELS",
+    ("skin", "zone_kernels"): "EC_ZONE_KERNELS",
+    ("skin", "taxel_force"): "EC_TAXEL_FORCE",
+    ("arm", "joint_angle"): "EC_JOINT_ANGLE",
+    ("arm", "joint_change"): "EC_JOINT_CHANGE",
+}
+"""{(zone, quantity): its name in C}, but for those that a zone's sums make."""
+OF_ZONES = {"along": "ALONG_ROWS", "around": "AROUND_COLS", "width": "WIDTH_OF_ZONE"}
+ROOTS = {"sqrt": "ROOT", "": "COURSE"}
+C_TYPES = {
+    "EC_INT8": "int8_t",
+    "EC_INT16": "int16_t",
+    "EC_INT32": "int32_t",
+    "EC_FLOAT": "float",
+    "EC_DOUBLE": "double",
+}
+
+
+def write(model: Model, folder: str | os.PathLike[str], frames: int = 160) -> None:
+    """Write a model's C.
+
+    Args:
+        model: the model.
+        folder: that is made.
+        frames: the most frames of a contact within the window.
+
+    Raises:
+        InputError: C lacks something that the model needs.
+    """
+    info = model.info
+    for reason in lacks(info):
+        raise InputError(f"{model.path}: cannot be written in C: {reason}")
+    source = Source()
+    features = _features(source, info, frames)
+    outputs = list(model.outputs)
+    points = range(len(model.decision_points_s))
+    graph = CompiledGraph(model, outputs, points)
+    source.array("const double", "ec_windows_s", map(float, model.decision_points_s))
+    _skin(source, info, frames)
+    source.define("POINTS", len(points))
+    source.define("ARENA", max(graph.arena, info.width + features))
+    _graph(source, graph)
+    target = Path(folder)
+    target.mkdir(parents=True, exist_ok=True)
+    for file in ROOMS.iterdir():
+        shutil.copy(file, target)
+    (target / "model.h").write_text(source.header())
+    (target / "model.c").write_text(source.text())
+
+
+class Source:
+    """Definitions of a model in C."""
+
+    def __init__(self) -> None:
+        self.defines: dict[str, str] = {}
+        self.lines: list[str] = []
+        self.bytes = 0
+
+    def define(self, name: str, value: object) -> None:
+        """A constant of the preprocessor."""
+        self.defines[f"EC_{name}"] = literal(value)
+
+    def array(self, kind: str, name: str, values: Iterable[object]) -> None:
+        """A constant array; it has one element where it would have none."""
+        inside = ", ".join(map(literal, values)) or "0"
+        self.lines.append(f"{kind} {name}[] = {{{inside}}};")
+
+    def header(self) -> str:
+        """The text of `model.h`."""
+        lines = [f"#define {name} {value}" for name, value in self.defines.items()]
+        return "\n".join(
+            ["#ifndef EC_MODEL_H", "#define EC_MODEL_H", *lines, "#endif", ""]
+        )
+
+    def text(self) -> str:
+        """The text of `model.c`."""
+        return "\n".join(['#include "internal.h"', "", *self.lines, ""])
+
+
+def literal(value: object) -> str:
+    """A value in C: hexadecimal floats hold every bit."""
+    if isinstance(value, str):
+        return value
+    if isinstance(value, bool | np.bool_):
+        return "true" if value else "false"
+    if isinstance(value, float | np.floating):
+        suffix = "f" if isinstance(value, np.float32) else ""
+        number = "INFINITY" if np.isinf(value) else float(value).hex() + suffix
+        return f"(double){number}" if number == "INFINITY" and not suffix else number
+    if isinstance(value, int | np.integer):
+        return str(value)
+    assert isinstance(value, Iterable)
+    return f"{{{', '.join(map(literal, value))}}}"
+
+
+def lacks(info: ModelInfo) -> Iterable[str]:
+    """What C lacks for a model, as sentences."""
+    layout = info.layout
+    types = feature_types(info.features)
+    if layout.axes or any(f.quantity in measures.SHEAR for f in types):
+        yield "it takes no shear"
+    total = layout.rows * layout.cols * 65535
+    if (total * max(2 * layout.cols, layout.rows)) ** 2 >= LARGEST:
+        yield f"the sums of {layout.rows} x {layout.cols} taxels exceed 64 bits"
+    for feature in types:
+        summed = feature.summary in ("mean", "deviation", "roughness")
+        if summed and (feature.samples or info.samples) > MOST_SUMMED:
+            yield f"{feature.name} sums up more than {MOST_SUMMED} samples"
+
+
+def _features(source: Source, info: ModelInfo, frames: int) -> int:
+    """The features; how many doubles they are measured in."""
+    layout = info.layout
+    types = feature_types(info.features)
+    rows = []
+    largest = 0
+    for feature, width in zip(types, info.widths, strict=True):
+        samples = feature.kernels or feature.samples or info.samples
+        summed = feature.summary not in ("", "rate")
+        count = width if summed else width // samples
+        largest = max(largest, summed * count * samples)
+        rows.append(_feature(feature, layout, samples, count))
+    source.define("FEATURES", len(rows))
+    source.array("const ec_feature", "ec_features", rows)
+    convolved = [
+        name for name in ("taxel_kernels", "zone_kernels") if name in info.kernels
+    ]
+    source.define("CONVOLVED", len(convolved))
+    for name in convolved:
+        table = info.kernels[name]
+        source.array("static const int8_t", f"shifts_of_{name}", table.shifts)
+        source.array("static const int32_t", f"biases_of_{name}", table.biases)
+        indices = [np.flatnonzero(mix) for mix in mixes(len(table.shifts))]
+        mixed = [number for mix in indices for number in (len(mix), *mix.tolist())]
+        source.array("static const uint8_t", f"mixes_of_{name}", mixed)
+    for name in ("taxel_kernels", "zone_kernels"):
+        fields = ["0", "0", "0", 0, [0] * 4]
+        if name in info.kernels:
+            fields = [f"{part}_of_{name}" for part in ("shifts", "biases", "mixes")]
+            table = info.kernels[name]
+            fields += [len(table.shifts), BIASES[len(table.biases)]]
+        source.lines.append(f"const ec_kernels ec_{name} = {literal(fields)};")
+    return largest + (len(measures.QUANTITIES) + 4) * frames
+
+
+def _feature(
+    feature: Feature, layout: SkinLayout, samples: int, rows: int
+) -> list[Any]:
+    """The `ec_feature` of a feature."""
+    place = feature.zone, feature.quantity
+    name = OF_ZONES.get(feature.quantity, feature.quantity.upper())
+    quantity = QUANTITIES.get(place, f"EC_{name}")
+    of_zone = place not in QUANTITIES
+    zone = f"EC_{feature.zone.upper()}" if of_zone else "EC_NO_ZONE"
+    kinds = [f"EC_{ROOTS.get(t, t.upper())}" for t in feature.transforms]
+    floor = float(transforms.floor_of(feature, layout))
+    summary = ROOTS.get(feature.summary, feature.summary.upper())
+    kinds += ["EC_NO_TRANSFORM"] * (3 - len(kinds))
+    return [floor, samples, rows, zone, quantity, kinds, f"EC_{summary}"]
+
+
+def _skin(source: Source, info: ModelInfo, frames: int) -> None:
+    """The skin, the arm and what is measured in every frame."""
+    layout = info.layout
+    types = feature_types(info.features)
+    quantities = {feature.quantity for feature in types}
+    zones = Zones(layout, types).names
+    cells = Cells(layout)
+    kernel_cells = Cells(layout, KERNEL_CELLS)
+    along, around = layout.pitch
+    values: dict[str, object] = {
+        "ROWS": layout.rows,
+        "COLS": layout.cols,
+        "WRAPS": int(layout.wraps),
+        "THRESHOLD": layout.threshold_counts,
+        "ONSET": layout.onset,
+        "DEBOUNCE": info.debounce,
+        "RELEASE_S": float(layout.release_s),
+        "WINDOW_S": float(info.window_s),
+        "SCALE": float(layout.counts_per_newton or 1.0),
+        "ALONG": float(along),
+        "AROUND": float(around),
+        "CYLINDER": int(layout.radius_m is not None),
+        "RADIUS_M": float(layout.radius_m or 0.0),
+        "ROW0_Z_M": float(layout.row0_z_m),
+        "TURN": 2.0 * pi,
+        "RADIANS": pi / 180.0,
+        "COLUMN_ANGLES": int(layout.column_angles_deg is not None),
+        "FORCE_FLOOR": float(transforms.force_floor(layout)),
+        "LENGTH_FLOOR": float(transforms.length_floor(layout)),
+        "FRAMES": frames,
+        "MOTION": int("motion" in quantities),
+        "FORCE_MOTION": int(not quantities.isdisjoint(("force_motion", "stiffness"))),
+        "ZONES": len(zones),
+        "CELLS": cells.count if "taxel_force" in quantities else 0,
+        "KERNEL_CELLS": kernel_cells.count if "taxel_kernels" in quantities else 0,
+        "JOINTS": info.joints,
+        "DOF": info.chain.dof if info.chain else 0,
+        "LINKS": len(info.chain.links) if info.chain else 0,
+        "WIDTH": info.width,
+    }
+    for name, value in values.items():
+        source.define(name, value)
+    source.array("const bool", "ec_alive", layout.alive.reshape(-1))
+    source.array("const uint8_t", "ec_zone_names", [f"EC_{z.upper()}" for z in zones])
+    source.array("const int16_t", "ec_cell_of_taxel", _of_taxels(layout, cells))
+    source.array(
+        "const int16_t", "ec_kernel_cell_of_taxel", _of_taxels(layout, kernel_cells)
+    )
+    angles = layout.column_angles_deg or (0.0,)
+    steps = [(b - a + 180.0) % 360.0 - 180.0 for a, b in pairwise([*angles, angles[0]])]
+    source.array("const ec_angle", "ec_angles", zip(angles, steps, strict=True))
+    links = [] if info.chain is None else info.chain.links
+    kinds = {"fixed": "EC_FIXED", "prismatic": "EC_PRISMATIC"}
+    rows = [
+        [axis, [x for row in step for x in row], after, kinds.get(kind, "EC_REVOLUTE")]
+        for kind, axis, step, after in links
+    ]
+    source.array("const ec_link", "ec_links", rows or ["{{0}, {0}, {0}, 0}"])
+
+
+def _of_taxels(layout: SkinLayout, cells: Cells) -> Array:
+    """(taxels,) the cell that each belongs to; -1 where it has no living taxel."""
+    rows, cols = np.indices(layout.shape) // cells.side
+    blocks = (rows * layout.cols + cols).reshape(-1)
+    living = np.unique(blocks[layout.alive.reshape(-1)])
+    numbers = living.searchsorted(blocks)
+    return np.where(np.isin(blocks, living), numbers, -1)
+
+
+def _graph(source: Source, graph: CompiledGraph) -> None:
+    """The steps and the tables of the graph."""
+    source.define("STEPS", len(graph.steps))
+    tables = []
+    for i, table in enumerate(graph.tables):
+        source.array(
+            f"static const {C_TYPES[table.kind]}", f"t{i}", table.values.reshape(-1)
+        )
+        source.bytes += table.values.nbytes
+        by_point = table.values.ndim - 1
+        tables.append([f"t{i}", table.values.shape[-1], table.kind, by_point])
+    source.array("const ec_table", "ec_tables", tables)
+    steps = [
+        [f"EC_{s.operator.upper()}", s.points, s.inputs, s.outputs, s.sizes]
+        for s in graph.steps
+    ]
+    source.array("const ec_step", "ec_steps", steps)
