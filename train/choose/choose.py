@@ -18,7 +18,12 @@ from train.choose.evaluate import (
     evaluate,
     fits,
 )
-from train.choose.protocols import GroupsLeftOut, TrialsLeftOut, promised
+from train.choose.protocols import (
+    GroupsLeftOut,
+    TrialsLeftOut,
+    promised,
+    rule_among,
+)
 from train.choose.rule import Rule
 from train.choose.search import SearchGrid
 from train.choose.settings import Chosen, Settings
@@ -81,6 +86,9 @@ class Choosing:
         self._jobs = jobs
         self._progress = progress
         self._widths = dict(zip(dataset.names, dataset.widths(samples), strict=True))
+        self._is_few = bool(divisions.further)
+        self._rule_of_groups = partial(rule_among, widths=self._widths)
+        self._rule_of_trials = partial(self._rule_of_groups, is_few=self._is_few)
 
     def _is_grouped(self, task: str) -> bool:
         """Whether entire groups are left out for a task."""
@@ -124,11 +132,12 @@ class Choosing:
                 vectors,
                 jobs=self._jobs,
                 progress=progress.update,
-                halve=True,
             )
-            trials = answers(folds, by_trial, nested=nested)
+            rules = self._rule_of_trials
+            trials = answers(folds, by_trial, nested=nested, halve=rules)
             further = [
-                answers(division, by_trial, nested=False) for division in further_folds
+                answers(division, by_trial, nested=False, halve=rules)
+                for division in further_folds
             ]
             trials = replace(trials, repeated=tuple(further))
             if self._groups is None:
@@ -136,7 +145,8 @@ class Choosing:
             carried_over = [c for c in candidates if not c.known]
             grouped_tasks = _grouped_tasks(self._groups, self._y)
             unseen = _unseen(self._groups, for_tasks(carried_over, grouped_tasks))
-            groups = answers(self._groups.folds, unseen, nested=nested)
+            rules = self._rule_of_groups if halve else None
+            groups = answers(self._groups.folds, unseen, nested=nested, halve=rules)
         return trials, groups
 
     def _right(self, window_s: float) -> dict[str, Floats]:
@@ -228,10 +238,10 @@ class Choosing:
         groups: AnswerTable,
     ) -> tuple[TrialsLeftOut, GroupsLeftOut | None]:
         """What is left out, with the answers to it."""
-        by_trial = TrialsLeftOut(trials, self._widths)
+        by_trial = TrialsLeftOut(trials, self._widths, self._is_few)
         if self._groups is None:
             return by_trial, None
-        return by_trial, GroupsLeftOut(groups, self._widths, self._groups)
+        return by_trial, GroupsLeftOut(groups, self._widths, groups=self._groups)
 
     def _protocol(
         self,

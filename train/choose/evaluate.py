@@ -29,7 +29,6 @@ from edge.arrays import Booleans, Floats, Integers
 from edge.errors import InputError
 from edge.statistics import wilson
 from train.choose.answers import answers_without
-from train.choose.candidates import costs
 from train.choose.halving import (
     Pair,
     choices_of,
@@ -102,6 +101,9 @@ class Promise(Result):
         return wilson(self.right / self.variance, self.total / self.variance)
 
 
+RuleOf = Callable[[Sequence[Choice]], Rule]
+
+
 @dataclass(frozen=True)
 class AnswerTable:
     """Every candidate's answers to every trial, by fits without that trial.
@@ -150,17 +152,17 @@ class AnswerTable:
                     right[:, folds == tested] | untested
                 )
 
-    def drop(self, reach: int, widths: Mapping[str, int]) -> None:
+    def drop(self, reach: int, rule_of: RuleOf) -> None:
         """Drop from each choice the grids that are unlikely to be chosen, by the folds
         within `reach` of its own; see `Rule.dropped`.
 
         Args:
             reach: places in the circle of folds.
-            widths: columns of each feature, by which a candidate has a price.
+            rule_of: gives the rule of the choice among some candidates.
         """
         count = len(fold_numbers(self.folds))
         for task, running in self.running.items():
-            prices = costs(self.choices[task], widths)
+            rule = rule_of(self.choices[task])
             grids = self.grids[task]
             by_choice = [*self.right[task], self._alone(task)]
             for choice, right in enumerate(by_choice):
@@ -168,8 +170,8 @@ class AnswerTable:
                 near &= self.tested[task]
                 places = np.flatnonzero(running[choice])
                 if near.any() and places.size:
-                    rule = Rule(prices[places])
-                    dropped = rule.dropped(right[places][:, near], grids[places])
+                    among = replace(rule, allowed=places)
+                    dropped = among.dropped(right[:, near], grids)
                     running[choice] &= ~np.isin(grids, dropped)
 
     def _alone(self, task: str) -> NDArray[Any]:
@@ -265,7 +267,7 @@ def evaluate(
     jobs: int = 1,
     progress: Callable[[], object] | None = None,
     nested: bool = True,
-    halve: bool = False,
+    halve: RuleOf | None = None,
 ) -> AnswerTable:
     """Fit every candidate without each fold, and without each two folds.
 
@@ -277,7 +279,8 @@ def evaluate(
         progress: called after each of the `fits`.
         nested: False makes the fits without each fold only, a fifth of the work. Of the
             table, `AnswerTable.plain` alone is then valid.
-        halve: drop the candidates that are clearly behind on the first folds.
+        halve: gives the rule by which candidates are dropped after the first folds;
+            None drops none.
 
     Raises:
         InputError: there are fewer than three folds, or the vectors are not finite.
@@ -290,7 +293,6 @@ def evaluate(
     vectors = replace(vectors, X=finite(vectors.X))
     classes = {task: _classes(labels) for task, labels in vectors.y.items()}
     table = _empty(folds, grids, classes)
-    widths = dict(zip(vectors.features, vectors.columns, strict=True))
     steps = rungs(count, nested) if halve else [(count, fold_pairs(count, nested))]
     for step, (reach, pairs) in enumerate(steps, 1):
         work = (
@@ -304,8 +306,8 @@ def evaluate(
             if progress is not None:
                 progress()
             table.enter(pair, answers)
-        if step < len(steps):
-            table.drop(reach, widths)
+        if halve is not None and step < len(steps):
+            table.drop(reach, halve)
     return table
 
 

@@ -51,8 +51,9 @@ class Rule:
         within = worse.mean(axis=1) <= np.maximum(error, self.margin)
         return int(candidates[best[within.argmax()]])
 
-    def dropped(self, right: Booleans | Floats, grids: Integers) -> list[int]:
-        """The grids of which none is likely to be chosen by further trials.
+    def dropped(self, right: Booleans, grids: Integers) -> list[int]:
+        """The grids of which no allowed candidate is likely to be chosen by further
+        trials.
 
         They are clearly behind the best, or cost more than the candidate that would be
         chosen by these trials and are right in none that it has wrong.
@@ -61,13 +62,14 @@ class Rule:
             right: (candidates, n) whether each answers a trial rightly.
             grids: (candidates,) the grid of each.
         """
+        assert self.allowed is not None
         answers = right.astype(np.float64)
         means = answers.mean(axis=1)
-        best = answers[means.argmax()]
+        best = answers[self.allowed[means[self.allowed].argmax()]]
         choice = self.choose(right)
         dropped = []
-        for grid in np.unique(grids):
-            places = np.flatnonzero(grids == grid)
+        for grid in np.unique(grids[self.allowed]):
+            places = self.allowed[grids[self.allowed] == grid]
             place = places[means[places].argmax()]
             worse = best - answers[place]
             behind = worse.mean() > BEHIND * worse.std() / np.sqrt(len(worse))

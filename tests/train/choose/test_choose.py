@@ -44,7 +44,7 @@ def settled():
         divisions = Divisions(folds, (), objects if grouped else None)
         choosing = Choosing(dataset, {"t": folds.astype(str)}, (), divisions, samples=1)
         by_trial = TrialsLeftOut(trials, {"max_force": 1})
-        by_group = GroupsLeftOut(unseen, {"max_force": 1}, objects)
+        by_group = GroupsLeftOut(unseen, {"max_force": 1}, groups=objects)
         protocol = by_group if grouped else by_trial
         chosen, without = choosing._settle("t", protocol, by_trial)
         return {

@@ -8,6 +8,7 @@ import pytest
 from tests.train.choose.test_evaluate import told_right
 from train.choose.evaluate import evaluate
 from train.choose.halving import fold_pairs, folds_near, rungs
+from train.choose.rule import Rule
 from train.choose.search import SearchGrid
 from train.data.vectors import Vectors
 
@@ -16,6 +17,11 @@ GRIDS = [
     SearchGrid("IV", "pca", (name,), components=(1, 2), neighbours=(3,))
     for name in ("max_force", "contact_area", "contact_motion")
 ]
+
+
+def by_price(choices):
+    """The rule of candidates of which the first are the cheapest."""
+    return Rule(np.arange(len(choices)))
 
 
 def test_the_first_fits_serve_each_choice_with_the_folds_beside_its_own():
@@ -45,7 +51,7 @@ def vectors():
 
 
 def test_a_grid_that_is_dropped_is_fitted_no_further(vectors):
-    table = evaluate(vectors, FOLDS, GRIDS, halve=True)
+    table = evaluate(vectors, FOLDS, GRIDS, halve=by_price)
     running = table.running["t"]
     assert running[:, :2].all()
     assert not running[:, 4:].any()
@@ -56,7 +62,7 @@ def test_a_grid_that_is_dropped_is_fitted_no_further(vectors):
 
 
 def test_the_answers_of_those_that_run_are_those_of_the_exported_estimators(vectors):
-    table = evaluate(vectors, FOLDS, GRIDS, halve=True)
+    table = evaluate(vectors, FOLDS, GRIDS, halve=by_price)
     choice = table.choices["t"][0]
     for fold, other in ((0, 1), (0, 5), (4, 4)):
         tested = other == FOLDS
@@ -70,6 +76,7 @@ def test_what_is_dropped_without_a_fold_does_not_depend_on_its_labels(vectors):
     labels[FOLDS == 3] = np.where(labels[FOLDS == 3] == "a", "b", "a")
     changed = replace(vectors, y={"t": labels})
     running, other = (
-        evaluate(v, FOLDS, GRIDS, halve=True).running["t"] for v in (vectors, changed)
+        evaluate(v, FOLDS, GRIDS, halve=by_price).running["t"]
+        for v in (vectors, changed)
     )
     assert (running[3] == other[3]).all()

@@ -36,12 +36,17 @@ def answers():
     return right
 
 
+def dropped(prices, right, grids):
+    """What is dropped where all may be chosen."""
+    return Rule(prices, np.arange(3)).dropped(right, np.array(grids))
+
+
 def test_grids_that_are_clearly_behind_or_dearer_and_never_better_are_dropped(answers):
-    grids = np.array([4, 5, 6])
-    assert Rule(np.array([0, 1, 2])).dropped(answers, grids) == [5, 6]
+    assert dropped(np.array([0, 1, 2]), answers, [4, 5, 6]) == [5, 6]
     # A cheaper one that is behind by no more than chance may win yet.
-    assert Rule(np.array([2, 1, 0])).dropped(answers, grids) == [6]
+    assert dropped(np.array([2, 1, 0]), answers, [4, 5, 6]) == [6]
+    assert dropped(None, answers, [4, 5, 6]) == [6]
 
 
 def test_a_grid_counts_by_its_best_candidate(answers):
-    assert Rule(np.array([1, 1, 1])).dropped(answers, np.array([4, 5, 5])) == []
+    assert dropped(np.array([1, 1, 1]), answers, [4, 5, 5]) == []
