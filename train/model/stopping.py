@@ -268,7 +268,8 @@ class SequentialClassifier:
                 self.right_[task][:, tests],
             )
             together = _curve(*evidence)
-            full = _curve(*(values[-1:] for values in evidence))
+            margins, excess, right, honest = (values[-1] for values in evidence)
+            full = _curve(margins, excess, right, honest)
             curves = [together] * (len(self.decision_points_s) - 1) + [full]
             slopes, intercepts, doubts = zip(*map(astuple, curves), strict=True)
             stopping[task] = Stopping(
