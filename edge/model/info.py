@@ -174,8 +174,7 @@ class Stopping:
             label is right is the logistic function of slope * `margin` + intercept -
             doubt * `Novelty.excess`.
         slope, intercept, doubt: the same of all decision points together, for the
-            rules. A point's own curve seldom rises high early, so with it the rules
-            would wait on clear contacts too.
+            rules.
         rules: in the order of rising error. Mean times never rise along them.
         trials: number of trials that certify the rules.
         wrong: number of these trials that are decided wrongly at the full window.

@@ -145,7 +145,7 @@ class Choosing:
             carried_over = [c for c in candidates if not c.known]
             grouped_tasks = _grouped_tasks(self._groups, self._y)
             unseen = _unseen(self._groups, for_tasks(carried_over, grouped_tasks))
-            rules = self._rule_of_groups if halve else None
+            rules = self._rule_of_groups
             groups = answers(self._groups.folds, unseen, nested=nested, halve=rules)
         return trials, groups
 

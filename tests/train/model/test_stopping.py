@@ -64,6 +64,17 @@ def test_rules_ask_for_the_same_margin_at_every_decision_point():
     assert log_odds == pytest.approx(expected)
 
 
+def test_the_full_window_has_a_curve_of_its_own():
+    """Early answers are right by chance, those of the full window always."""
+    X, labels = touches(60)
+    X[1] = X[0]
+    stopping = calibrated(of_neighbours(3), X, {"t": labels}).stopping_["t"]
+    assert stopping.slopes[:2] == (stopping.slope,) * 2
+    assert stopping.intercepts[:2] == (stopping.intercept,) * 2
+    assert stopping.slopes[2] != stopping.slope
+    assert stopping.intercepts[2] > stopping.intercept
+
+
 def test_each_fold_is_answered_by_what_was_chosen_without_it():
     X, labels = touches(60)
     folds = stratified_folds(labels)
