@@ -18,6 +18,9 @@ from train.progress import say
 
 JITTER_STEPS = 0.5
 """A time may go back by so many of the usual steps."""
+AHEAD_S = 60.0
+AHEAD_JITTERS = 200.0
+"""A time that jumps by more, and by more than so many jitters, is a wrong one."""
 MOST_REPEATED = 0.01
 """Share of the frames that may have the time of the frame before."""
 GAP_STEPS = 5.0
@@ -66,11 +69,14 @@ def order(
     steps = np.diff(t)
     forward = steps[steps > 0.0]
     jitter_s = JITTER_STEPS * float(np.median(forward)) if len(forward) else 0.0
-    back = np.flatnonzero(steps < -jitter_s)
-    if len(back):
+    far_s = max(AHEAD_S, AHEAD_JITTERS * jitter_s)
+    wrong = np.flatnonzero((steps < -jitter_s) | (steps > far_s))
+    if len(wrong):
+        step_s = steps[wrong[0]]
+        goes = "goes back" if step_s < 0.0 else "jumps"
         raise InputError(
-            f"{where}: its time goes back by {-steps[back[0]]:g} s at {frame} "
-            f"{numbers[back[0] + 1]}; split it there, or fix the times"
+            f"{where}: its time {goes} by {abs(step_s):g} s at {frame} "
+            f"{numbers[wrong[0] + 1]}; split it there, or fix the times"
         )
     frames = np.argsort(t, kind="stable")
     last = np.append(np.diff(t[frames]) > 0.0, True)
