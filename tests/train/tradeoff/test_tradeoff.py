@@ -22,7 +22,6 @@ from export.__main__ import main
 from tests import browser
 from tests.conftest import export, rows_of, save_touches
 from tests.train.tradeoff.examples import chosen, measured, rule
-from train.choose import candidates
 from train.commands.tradeoff import cost
 from train.data.dataset import Recordings, read
 from train.data.parts import part
@@ -415,6 +414,12 @@ class Written:
         return self.report.read_text()
 
 
+def quickly(change, like, answered=costs.answered):
+    """A change with a quick choice, even where that among all candidates is asked
+    for."""
+    return answered(replace(change, options={}), like)
+
+
 @pytest.fixture(scope="module")
 def written(tmp_path_factory):
     """The report on 28 touches, with few windows and changes."""
@@ -428,7 +433,7 @@ def written(tmp_path_factory):
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(running, "FEWEST", 28)
         patch.setattr(early, "FOLDS", 4)
-        patch.setattr(candidates, "PLAIN", candidates.PLAIN[:4])
+        patch.setattr(costs, "answered", quickly)
         patch.setattr(costs, "PARTS", (1,))
         patch.setattr(running, "WINDOWS_S", (0.4, 1.2))
         patch.setattr(choices, "CHOSEN_S", (0.4, 1.2))
