@@ -414,6 +414,12 @@ class Written:
         return self.report.read_text()
 
 
+def quickly(change, like, answered=costs.answered):
+    """A change with a quick choice, even where that among all candidates is asked
+    for."""
+    return answered(replace(change, options={}), like)
+
+
 @pytest.fixture(scope="module")
 def written(tmp_path_factory):
     """The report on 28 touches, with few windows and changes."""
@@ -427,6 +433,7 @@ def written(tmp_path_factory):
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(running, "FEWEST", 28)
         patch.setattr(early, "FOLDS", 4)
+        patch.setattr(costs, "answered", quickly)
         patch.setattr(costs, "PARTS", (1,))
         patch.setattr(running, "WINDOWS_S", (0.4, 1.2))
         patch.setattr(choices, "CHOSEN_S", (0.4, 1.2))
