@@ -58,9 +58,10 @@ class JointAngles:
         elif frame.t - before.t >= APPROACH_S:
             self._before = frame
             self.speed = math.nan
-            if before.joints is not None and frame.joints is not None:
-                change = math.dist(before.joints, frame.joints)
-                self.speed = change / (frame.t - before.t)
+            start = before.joints
+            end = frame.joints
+            if start is not None and end is not None and len(start) == len(end):
+                self.speed = math.dist(start, end) / (frame.t - before.t)
 
     def read(self, frame: Frame) -> Floats:
         """(count,) angles of a frame; NaN where they are not known.

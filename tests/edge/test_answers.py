@@ -1,14 +1,17 @@
 """Answers about a contact, and the flags that say what there is to doubt."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
+from edge.answers import contact_doubts
 from edge.classifier import Classifier
 from edge.errors import InputError
 from edge.events import Decided
 from edge.model.model import Model
+from tests.edge.touch.test_joint_doubts import RATE, series, stopped
 
 
 def decided(model, recording):
@@ -104,3 +107,17 @@ def test_a_second_region_is_a_doubt_unless_the_named_label_often_had_one(
     events = decided(model, touch)
     assert [event.label for event in events] == ["soft-fixed", "soft 0"]
     assert ["several" in event.flags for event in events] == [label == "none"] * 2
+
+
+def test_joint_angles_are_compared_with_those_of_training(model):
+    contact = SimpleNamespace(
+        missing_taxels=False, missing_pose=False, late=False, chain=None
+    )
+    usual = {"joints": 2, "still_s": (0.0, 0.0), "speeds": (0.4, 0.6)}
+    info = replace(model.info, **usual)
+    doubts = contact_doubts(info, contact, series(lambda t: 0.5 * RATE * t), 1.2)
+    assert doubts["speed"]
+    assert not doubts["still_joints"]
+    doubts = contact_doubts(info, contact, series(stopped(0, 0.5)), 1.2)
+    assert doubts["still_joints"]
+    assert not doubts["speed"]

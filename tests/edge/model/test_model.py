@@ -180,6 +180,7 @@ REFUSED = {
     meta(
         units={"max_force": "newton"}
     ): "units.contact_area is missing; export it again",
+    meta(speeds=[0.3]): "speeds must be a list of 2 numbers",
     meta(trials=["a"]): "names 1 of 16 trials",
     edited(
         lambda m: m["tasks"]["category"]["labels"].append("liquid")

@@ -24,6 +24,6 @@ def test_the_speed_is_not_known_where_the_stream_begins_with_the_contact(lead):
 
 def test_the_speed_is_not_known_where_angles_were_missing():
     reader = JointAngles(2)
-    for t, joints in [(0.0, RATE), (0.1, None), (0.2, RATE)]:
+    for t, joints in [(0.0, RATE), (0.1, None), (0.2, RATE), (0.3, RATE[:1])]:
         reader.watch(pressed(LAYOUT, t, {}, joints=joints))
         assert np.isnan(reader.speed)

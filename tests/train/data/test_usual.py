@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from train.data.usual import FASTER, SLOWER, usual_touches
+from train.data.usual import FASTER, RESTS, SLOWER, usual_touches
 
 
 def touch(speed, rest=0, joints=True, beside=0):
@@ -39,7 +39,7 @@ def test_the_standstill_and_the_speeds_are_those_of_nearly_all_trials():
     trials.append(touch(np.nan))
     found = usual({"object": ["box"] * 102}, trials)
     assert found["still_s"] == pytest.approx((0.0, 0.4))
-    assert found["speeds"] == pytest.approx((1.01 * SLOWER, 1.99 * FASTER))
+    assert found["speeds"] == pytest.approx((1.01 * SLOWER, 1.99 * FASTER + RESTS))
 
 
 def test_without_joint_angles_nothing_is_said_of_them():
