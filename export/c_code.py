@@ -86,10 +86,12 @@ def write(
     scratch = _features(source, model.info, frames)
     windows_s = model.decision_points_s
     points = range(len(windows_s)) if error is not None else [len(windows_s) - 1]
-    graph = CompiledGraph(model, list(model.outputs), points)
+    graph = CompiledGraph(
+        model, list(model.outputs), points, arena=model.info.width + scratch
+    )
     _skin(source, model.info, frames)
     source.define("POINTS", len(points))
-    source.define("ARENA", max(graph.arena, model.info.width + scratch))
+    source.define("ARENA", graph.arena)
     source.array("const double", "ec_windows_s", [float(windows_s[i]) for i in points])
     _graph(source, graph)
     _tasks(source, model, graph.places, points, error)
@@ -257,7 +259,11 @@ def _skin(source: Source, info: ModelInfo, frames: int) -> None:
     for name, value in values.items():
         source.define(name, value)
     source.array("const bool", "ec_alive", layout.alive.reshape(-1))
-    source.array("const uint8_t", "ec_zone_names", [f"EC_{z.upper()}" for z in zones])
+    source.array(
+        "const uint8_t",
+        "ec_zone_names",
+        [f"EC_{z.upper()}" for z in (*zones, "no_zone")],
+    )
     source.array("const int16_t", "ec_cell_of_taxel", _of_taxels(layout, cells))
     source.array(
         "const int16_t", "ec_kernel_cell_of_taxel", _of_taxels(layout, kernel_cells)
@@ -344,6 +350,7 @@ def _tasks(
                 [f"indices_{i}_of_{len(rows)}" for i in range(2)],
                 *(places.get(f"{name}_{end}", 0) for end in ends),
                 len(task.labels),
+                task.k,
                 [names.index(factor) for factor, _ in factors] or [0, 0],
                 of_rule[1],
                 rule is not None,

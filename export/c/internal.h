@@ -110,7 +110,7 @@ typedef struct {
 extern const ec_angle ec_angles[];
 extern const ec_link ec_links[];
 extern const bool ec_alive[];
-extern const uint8_t ec_zone_names[];
+extern const uint8_t ec_zone_names[]; /* EC_NO_ZONE comes last */
 extern const int16_t ec_cell_of_taxel[];
 extern const int16_t ec_kernel_cell_of_taxel[];
 
@@ -227,6 +227,7 @@ typedef struct {
   uint32_t neighbours;
   uint32_t label_distances; /* 0: none */
   uint16_t labels;
+  uint16_t k;
   uint8_t factors[2];
   uint8_t rule_last;
   bool has_rule;
