@@ -5,15 +5,16 @@ from __future__ import annotations
 
 import os
 import shutil
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping, Sequence
 from itertools import pairwise
-from math import pi
+from math import ceil, pi
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from edge.arrays import Array
+from edge.early import stopping_rules
 from edge.errors import InputError
 from edge.model.info import ModelInfo
 from edge.model.model import Model
@@ -27,6 +28,8 @@ from edge.touch.zones import Zones
 from export.c_graph import CompiledGraph
 
 ROOMS = Path(__file__).parent / "c"
+RATE_HZ = 120.0
+"""Frames a second for which there is room."""
 LARGEST = 2**63
 """No product of a frame's sums may reach it."""
 MOST_SUMMED = 128
@@ -54,36 +57,51 @@ C_TYPES = {
 }
 
 
-def write(model: Model, folder: str | os.PathLike[str], frames: int = 160) -> None:
+def write(
+    model: Model,
+    folder: str | os.PathLike[str],
+    error: float | None = None,
+    frames: int | None = None,
+) -> Source:
     """Write a model's C.
 
     Args:
         model: the model.
         folder: that is made.
-        frames: the most frames of a contact within the window.
+        error: the accepted share of wrong decisions, for early ones; None decides at
+            the full window, and leaves out the tables of the other decision points.
+        frames: the most frames of a contact within the window; `RATE_HZ` where None.
+
+    Returns:
+        What was written, with its size.
 
     Raises:
-        InputError: C lacks something that the model needs.
+        InputError: C lacks something that the model needs, or the error rate is not
+            certified.
     """
-    info = model.info
-    for reason in lacks(info):
-        raise InputError(f"{model.path}: cannot be written in C: {reason}")
+    for reason in lacks(model.info):
+        raise InputError(f"{model.path}: cannot be written in C, as {reason}")
+    frames = frames or ceil(model.info.window_s * RATE_HZ) + 4
     source = Source()
-    features = _features(source, info, frames)
-    outputs = list(model.outputs)
-    points = range(len(model.decision_points_s))
-    graph = CompiledGraph(model, outputs, points)
-    source.array("const double", "ec_windows_s", map(float, model.decision_points_s))
-    _skin(source, info, frames)
+    scratch = _features(source, model.info, frames)
+    windows_s = model.decision_points_s
+    points = range(len(windows_s)) if error is not None else [len(windows_s) - 1]
+    graph = CompiledGraph(
+        model, list(model.outputs), points, arena=model.info.width + scratch
+    )
+    _skin(source, model.info, frames)
     source.define("POINTS", len(points))
-    source.define("ARENA", max(graph.arena, info.width + features))
+    source.define("ARENA", graph.arena)
+    source.array("const double", "ec_windows_s", [float(windows_s[i]) for i in points])
     _graph(source, graph)
+    _tasks(source, model, graph.places, points, error)
     target = Path(folder)
     target.mkdir(parents=True, exist_ok=True)
     for file in ROOMS.iterdir():
         shutil.copy(file, target)
     (target / "model.h").write_text(source.header())
     (target / "model.c").write_text(source.text())
+    return source
 
 
 class Source:
@@ -236,11 +254,16 @@ def _skin(source: Source, info: ModelInfo, frames: int) -> None:
         "DOF": info.chain.dof if info.chain else 0,
         "LINKS": len(info.chain.links) if info.chain else 0,
         "WIDTH": info.width,
+        "ANGLES": info.dof or 0,
     }
     for name, value in values.items():
         source.define(name, value)
     source.array("const bool", "ec_alive", layout.alive.reshape(-1))
-    source.array("const uint8_t", "ec_zone_names", [f"EC_{z.upper()}" for z in zones])
+    source.array(
+        "const uint8_t",
+        "ec_zone_names",
+        [f"EC_{z.upper()}" for z in (*zones, "no_zone")],
+    )
     source.array("const int16_t", "ec_cell_of_taxel", _of_taxels(layout, cells))
     source.array(
         "const int16_t", "ec_kernel_cell_of_taxel", _of_taxels(layout, kernel_cells)
@@ -283,3 +306,99 @@ def _graph(source: Source, graph: CompiledGraph) -> None:
         for s in graph.steps
     ]
     source.array("const ec_step", "ec_steps", steps)
+
+
+def _tasks(
+    source: Source,
+    model: Model,
+    places: Mapping[str, int],
+    points: Sequence[int],
+    error: float | None,
+) -> None:
+    """The tasks, their labels and their calibration."""
+    info = model.info
+    names = list(info.tasks)
+    rules = {} if error is None else stopping_rules(model, error)
+    source.define("TASKS", len(names))
+    source.define("MOST_LABELS", max(len(task.labels) for task in info.tasks.values()))
+    source.define("CALIBRATED", int(info.novelty is not None))
+    source.define("EARLY", int(error is not None))
+    for output in ("out_of_range", "novelty", "remoteness"):
+        source.define(f"PLACE_{output.upper()}", places.get(output, 0))
+    rows = []
+    for name, task in info.tasks.items():
+        stopping = info.stopping.get(name)
+        curves = [(0.0, 0.0, 0.0)]
+        whole = curves[0]
+        if stopping is not None:
+            of_points = stopping.slopes, stopping.intercepts, stopping.doubts
+            curves = [tuple(column[i] for column in of_points) for i in points]
+            whole = stopping.slope, stopping.intercept, stopping.doubt
+        source.array("static const ec_curve", f"curves_of_{len(rows)}", floats(curves))
+        factors = list(task.factors.items())
+        for i in range(2):
+            indices = factors[i][1] if factors else []
+            source.array("static const uint8_t", f"indices_{i}_of_{len(rows)}", indices)
+        rule = rules.get(name)
+        of_rule = (0.0, 0) if rule is None else (float(rule.confidence), rule.last)
+        ends = "label scores distances neighbours label_distances".split()
+        rows.append(
+            [
+                f"curves_of_{len(rows)}",
+                floats(whole),
+                of_rule[0],
+                [f"indices_{i}_of_{len(rows)}" for i in range(2)],
+                *(places.get(f"{name}_{end}", 0) for end in ends),
+                len(task.labels),
+                task.k,
+                [names.index(factor) for factor, _ in factors] or [0, 0],
+                of_rule[1],
+                rule is not None,
+                bool(factors),
+            ]
+        )
+    source.array("const ec_task", "ec_tasks", rows)
+    order = sorted(range(len(names)), key=lambda i: bool(info.tasks[names[i]].factors))
+    source.array("const uint8_t", "ec_order", order)
+    _labels(source, info)
+    _doubts(source, info, points)
+
+
+def _labels(source: Source, info: ModelInfo) -> None:
+    """The names of tasks and labels."""
+    for i, task in enumerate(info.tasks.values()):
+        labels = map(quoted, task.labels)
+        source.array("static const char *const", f"labels_of_{i}", labels)
+    lists = [f"labels_of_{i}" for i in range(len(info.tasks))]
+    source.array("const char *const *const", "ec_labels", lists)
+    source.array("const char *const", "ec_task_names", map(quoted, info.tasks))
+
+
+def _doubts(source: Source, info: ModelInfo, points: Sequence[int]) -> None:
+    """The limits of novelty and remoteness at the decision points."""
+    novelty = info.novelty
+    naming = [name for name, s in info.stopping.items() if s.remoteness is not None]
+    remoteness = info.stopping[naming[0]].remoteness if naming else None
+    source.define("NAMING", [*info.tasks].index(naming[0]) if naming else 255)
+    for name, table in (
+        ("typical", novelty and novelty.typical),
+        ("novel", novelty and novelty.limits),
+        ("remote", remoteness and remoteness.limits),
+        ("middles", remoteness and remoteness.middles),
+        ("known_slopes", remoteness and remoteness.slopes),
+    ):
+        values = [float(table[i]) for i in points] if table else []
+        source.array("const double", f"ec_{name}", values)
+
+
+def quoted(text: str) -> str:
+    """A text as a literal of C; what is not ASCII, as the bytes of UTF-8."""
+    codes = (f"\\{byte:03o}" for byte in text.encode())
+    return '"' + "".join(codes) + '"'
+
+
+def floats(values: Any) -> Any:
+    """Nested numbers as floats."""
+    if isinstance(values, Sequence):
+        return [floats(value) for value in values]
+    return float(values)

@@ -76,7 +76,11 @@ class CompiledGraph:
     """
 
     def __init__(
-        self, model: Model, outputs: Sequence[str], points: Sequence[int]
+        self,
+        model: Model,
+        outputs: Sequence[str],
+        points: Sequence[int],
+        arena: int,
     ) -> None:
         """Compile.
 
@@ -84,12 +88,14 @@ class CompiledGraph:
             model: whose graph it is.
             outputs: that are computed.
             points: the decision points that are kept.
+            arena: the least size of the arena.
 
         Raises:
             InputError: there are too many decision points.
         """
         if len(points) > MOST_POINTS:
             raise InputError(f"C takes at most {MOST_POINTS} decision points")
+        self.arena = max(arena, model.info.width)
         graph = Graph(model.contents)
         self._makers = graph.makers
         x = np.zeros((1, model.info.width))
@@ -156,7 +162,6 @@ class CompiledGraph:
                 last[roots[name]] = max(last.get(roots[name], i), last.get(name, i))
         self.places = {"features": 0}
         taken = {"features": (0, self._shapes["features"][1])}
-        self.arena = self._shapes["features"][1]
         for i, node in enumerate(nodes):
             size = prod(self._shapes[node.outputs[0]])
             for name in node.inputs:
@@ -236,8 +241,8 @@ class CompiledGraph:
 
     def _operand(self, name: str) -> int:
         """The place of a value, or the number of its table."""
-        if name in self.places:
-            return self.places[name]
+        if name in self._shapes:
+            return self.places.get(name, 0)  # of what no point needs, any
         values = np.stack([at[name].reshape(-1) for at in self._constants]).astype(
             float
         )

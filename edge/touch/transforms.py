@@ -27,6 +27,7 @@ def length_floor(layout: SkinLayout) -> float:
 
 
 def floor_of(feature: Feature, layout: SkinLayout) -> float:
+    """What is added to a feature before its logarithm is taken."""
     if feature.quantity in FORCES:
         return force_floor(layout)
     if feature.quantity in ("motion", "force_motion"):

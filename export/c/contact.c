@@ -170,6 +170,7 @@ static int add(const uint16_t *counts, const bool *valid, const double *joints, 
   if (!joints) ec_now.missing_pose = true;
 #endif
   (void)pool;
+  (void)counts;
   ec_now.rows++;
   ec_now.age_s = age_s;
   return 0;

@@ -1,5 +1,72 @@
+/* Decides what a robot's skin touches, from raw counts, with the bits of `edge-classify replay`.
+   One contact at a time; no heap, no recursion, no mathematical library. Its RAM is static:
+   sizeof ec_now + sizeof ec_arena + 7 bytes a taxel, which `edge-classify export --c` prints.
+
+   Compile every .c file of this folder with -std=c99 -ffp-contract=off. */
 #ifndef EDGE_CLASSIFY_H
 #define EDGE_CLASSIFY_H
+
+#include <stdbool.h>
+#include <stdint.h>
+
 #include "model.h"
-enum { EC_TOO_FAST = -1, EC_BAD_TIME = -2, EC_BAD_JOINTS = -3 };
+
+typedef enum { EC_ONSET_EVENT, EC_RELEASE_EVENT, EC_DECIDED_EVENT } ec_kind;
+typedef enum { EC_NOTHING, EC_CONFIDENCE, EC_WINDOW } ec_stopped_by;
+
+/* Reasons to doubt a decision: docs/formats.md. */
+enum {
+  EC_SHORT = 1,
+  EC_MISSING_TAXELS = 2,
+  EC_MISSING_POSE = 4,
+  EC_AS_TRAINED = 8,
+  EC_OUT_OF_RANGE = 16,
+  EC_UNUSUAL = 32,
+  EC_UNKNOWN = 64,
+  EC_TIE = 128,
+  EC_UNSURE = 256,
+  EC_UNCERTIFIED = 512
+};
+
+typedef struct {
+  ec_kind kind;
+  double onset_s;
+  /* of a decision */
+  double window_s;
+  double confidence; /* to millionths; not a number of a model without calibration */
+  uint32_t nearest;  /* the nearest training trial */
+  int16_t label;     /* index into the task's labels; -1: null */
+  uint16_t flags;
+  uint8_t task;
+  ec_stopped_by stopped_by; /* with an error rate */
+} ec_event;
+
+/* Errors of ec_push. */
+enum {
+  EC_TOO_FAST = -1,   /* more than EC_FRAMES frames in a window: the frame is left out */
+  EC_BAD_TIME = -2,   /* time is not finite or goes back */
+  EC_BAD_JOINTS = -3, /* an angle is not finite, or beyond a million radians */
+};
+
+#define EC_MOST_EVENTS (EC_TASKS + 2)
+
+/* Forget all: before the first frame, and where the stream has had a gap. */
+void ec_begin(void);
+
+/* Take in a frame. A contact that has ended is decided at once, from what was felt of it; others
+   when their windows end.
+
+   counts: above the baseline, by rows from elbow to wrist; valid: which could be read, or NULL of
+   all; t_s: seconds; joints: the EC_DOF or EC_JOINTS angles in radians, or NULL where not known.
+   Returns the number of events, in the order of time, or an error below 0. */
+int ec_push(
+    const uint16_t *counts, const bool *valid, double t_s, const double *joints,
+    ec_event events[EC_MOST_EVENTS]);
+
+/* End the stream: tasks that wait are decided, flagged EC_SHORT. */
+int ec_finish(ec_event events[EC_MOST_EVENTS]);
+
+extern const char *const ec_task_names[];
+extern const char *const *const ec_labels[]; /* of each task */
+
 #endif

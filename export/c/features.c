@@ -295,11 +295,11 @@ static double *behind(const ec_feature *feature, double *out) {
 /* The features of the window from onset on, at the arena's beginning. */
 void ec_vector(double window_s) {
   feel(window_s);
-  for (uint32_t i = 0; i <= EC_ZONES; i++) {
-    uint8_t zone = i < EC_ZONES ? ec_zone_names[i] : EC_NO_ZONE;
+  for (uint32_t i = 0; i < EC_ZONES + 1; i++) {
+    uint8_t zone = ec_zone_names[i];
     double *out = ec_arena;
 #if EC_ZONES
-    if (i < EC_ZONES) measure(i);
+    if (zone != EC_NO_ZONE) measure(i);
 #endif
     for (const ec_feature *feature = ec_features; feature < ec_features + EC_FEATURES; feature++) {
       double *next = behind(feature, out);

@@ -51,6 +51,7 @@ void ec_zone(
 
 /* contact.c */
 #define EC_NAN ((double)NAN)
+#define EC_INFINITY ((double)INFINITY)
 #define EC_AT_LEAST_1(n) ((n) ? (n) : 1)
 
 typedef struct {
@@ -109,7 +110,7 @@ typedef struct {
 extern const ec_angle ec_angles[];
 extern const ec_link ec_links[];
 extern const bool ec_alive[];
-extern const uint8_t ec_zone_names[];
+extern const uint8_t ec_zone_names[]; /* EC_NO_ZONE comes last */
 extern const int16_t ec_cell_of_taxel[];
 extern const int16_t ec_kernel_cell_of_taxel[];
 
@@ -207,6 +208,39 @@ enum {
 extern const ec_table ec_tables[];
 extern const ec_step ec_steps[];
 extern const double ec_windows_s[];
+
+/* model.c: the tasks, and places of the graph's outputs in the arena */
+typedef struct {
+  double slope;
+  double intercept;
+  double doubt;
+} ec_curve;
+
+typedef struct {
+  const ec_curve *curves; /* of each decision point */
+  ec_curve rule_curve;
+  double rule_confidence; /* above 1: a fixed window */
+  const uint8_t *indices[2]; /* of a product: the factors' label of each label */
+  uint32_t label;
+  uint32_t scores;
+  uint32_t distances;
+  uint32_t neighbours;
+  uint32_t label_distances; /* 0: none */
+  uint16_t labels;
+  uint16_t k;
+  uint8_t factors[2];
+  uint8_t rule_last;
+  bool has_rule;
+  bool is_product;
+} ec_task;
+
+extern const ec_task ec_tasks[];
+extern const uint8_t ec_order[]; /* tasks, a product behind its factors */
+extern const double ec_typical[]; /* of each decision point */
+extern const double ec_novel[];
+extern const double ec_remote[];
+extern const double ec_middles[];
+extern const double ec_known_slopes[];
 
 /* graph.c: edge/model/graph.py */
 extern double ec_arena[EC_ARENA];

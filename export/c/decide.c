@@ -1,0 +1,291 @@
+/* From a contact to its events: edge/classifier.py, answers.py, early.py, model/model.py, info.py,
+   agreement.py. */
+#include "internal.h"
+
+typedef struct {
+  double confidence; /* rounded as Python rounds it */
+  uint32_t nearest;
+  int16_t label; /* -1: null */
+  int16_t decision_label;
+  uint16_t flags;
+  bool refused;
+  ec_stopped_by stopped_by;
+} answer;
+
+static answer answers[EC_TASKS];
+static bool decided[EC_TASKS];
+static uint32_t waiting; /* tasks */
+static uint32_t point;   /* the next decision point */
+static bool announced;   /* whether the onset was */
+static double last_s;
+static double distances[EC_TASKS][EC_MOST_LABELS];
+
+static double output(uint32_t place) { return ec_arena[place]; }
+
+/* To millionths, as Python's round does it; x is from 0 to 1. */
+static double rounded(double x) {
+  double p = x * 1e6;
+  double n = ec_rint(p);
+  double high = (x * 134217729.0) - (x * 134217729.0 - x); /* Dekker's split */
+  double error = (high * 1e6 - p) + (x - high) * 1e6;
+  if (p - n == 0.5 && error > 0.0) n += 1.0;
+  if (p - n == -0.5 && error < 0.0) n -= 1.0;
+  return n / 1e6;
+}
+
+static double margin(const double *distance, int16_t label, uint32_t labels) {
+  double rival = EC_INFINITY;
+  for (uint32_t i = 0; i < labels; i++) {
+    if ((int16_t)i != label && distance[i] < rival) rival = distance[i];
+  }
+  if (labels == 1) rival = distance[label];
+  return distance[label] < EC_INFINITY ? rival - distance[label] : -EC_INFINITY;
+}
+
+#if EC_CALIBRATED
+static double excess(void) {
+  double typical = ec_typical[point];
+  double score = output(EC_PLACE_NOVELTY);
+  return score > typical && typical > 0.0 ? ec_log(score / typical) : 0.0;
+}
+
+/* Probability that the thing is one of those in training. */
+static double known(void) {
+  double score = output(EC_PLACE_REMOTENESS);
+  if (score <= 0.0) return 1.0;
+  return ec_logistic(ec_known_slopes[point] * ec_log(ec_middles[point] / score));
+}
+#endif
+
+/* The calibrated confidence of a label by its curve. */
+static double confidence(const ec_curve *curve, const ec_task *task, const double *distance,
+                         int16_t label) {
+#if EC_CALIBRATED
+  double log_odds = curve->slope * margin(distance, label, task->labels);
+  log_odds += curve->intercept;
+  return ec_logistic(log_odds - curve->doubt * excess());
+#else
+  (void)curve;
+  (void)task;
+  (void)distance;
+  (void)label;
+  (void)margin;
+  return EC_NAN;
+#endif
+}
+
+/* The nearest answer in which a product and its factors agree. */
+static void agree(uint32_t index) {
+  const ec_task *task = &ec_tasks[index];
+  double *total = distances[index];
+  uint32_t best = 0;
+  for (uint32_t i = 0; i < task->labels; i++) {
+    for (uint32_t f = 0; f < 2; f++) {
+      total[i] = total[i] + distances[task->factors[f]][task->indices[f][i]];
+    }
+    if (total[i] < total[best]) best = i;
+  }
+  answers[index].decision_label = (int16_t)best;
+  for (uint32_t f = 0; f < 2; f++) {
+    uint32_t factor = task->factors[f];
+    answers[factor].decision_label = task->indices[f][best];
+    for (uint32_t i = 0; i < ec_tasks[factor].labels; i++) distances[factor][i] = EC_INFINITY;
+    for (uint32_t i = 0; i < task->labels; i++) {
+      double *nearest = &distances[factor][task->indices[f][i]];
+      if (total[i] < *nearest) *nearest = total[i];
+    }
+  }
+}
+
+static void withhold(answer *a) {
+  a->label = -1;
+  a->confidence = 0.0;
+  a->flags |= EC_UNKNOWN;
+}
+
+static uint16_t flag(bool holds, uint16_t bit) { return holds ? bit : 0; }
+
+/* The model's answer to a task, with the reasons to doubt it. */
+static void ask(uint32_t index, uint16_t doubts) {
+  const ec_task *task = &ec_tasks[index];
+  answer *a = &answers[index];
+  double most = 0.0;
+  uint32_t ties = 0;
+  for (uint32_t i = 0; i < task->labels; i++) {
+    double votes = output(task->scores + i);
+    ties = votes > most ? 1 : ties + (votes == most);
+    if (votes > most) most = votes;
+  }
+  double likely = confidence(
+      &task->curves[EC_CALIBRATED ? point : 0], task, distances[index], a->decision_label);
+  a->label = a->decision_label;
+  a->stopped_by = EC_NOTHING;
+  a->nearest = (uint32_t)output(task->neighbours);
+  a->flags = doubts;
+  a->flags |= flag(output(task->distances) == 0.0, EC_AS_TRAINED);
+  a->flags |= flag(output(EC_PLACE_OUT_OF_RANGE) > 0.0, EC_OUT_OF_RANGE);
+  a->flags |= flag(ties > 1, EC_TIE);
+#if EC_CALIBRATED
+  if (index == EC_NAMING) likely *= known();
+  a->confidence = rounded(likely);
+  if (index == EC_NAMING && output(EC_PLACE_REMOTENESS) > ec_remote[point]) withhold(a);
+#else
+  a->confidence = likely;
+#endif
+}
+
+/* The model's answers at the decision point. */
+static void ask_all(bool is_short) {
+  uint16_t doubts = flag(is_short, EC_SHORT);
+  doubts |= flag(ec_now.missing_taxels, EC_MISSING_TAXELS);
+  doubts |= flag(ec_now.missing_pose, EC_MISSING_POSE);
+  bool refused = false;
+  ec_vector(ec_windows_s[point]);
+  ec_graph(point);
+  for (uint32_t i = 0; i < EC_TASKS; i++) {
+    answers[i].decision_label = (int16_t)output(ec_tasks[i].label);
+    refused = refused || answers[i].decision_label < 0;
+    for (uint32_t j = 0; ec_tasks[i].label_distances && j < ec_tasks[i].labels; j++) {
+      distances[i][j] = output(ec_tasks[i].label_distances + j);
+    }
+  }
+  for (uint32_t i = 0; i < EC_TASKS; i++) {
+    if (refused) {
+      answer null = {0.0, 0, -1, -1, (uint16_t)(doubts | EC_OUT_OF_RANGE), true, EC_NOTHING};
+      answers[i] = null;
+    } else if (ec_tasks[i].is_product) {
+      agree(i);
+    }
+  }
+  if (refused) return;
+#if EC_CALIBRATED
+  doubts |= flag(output(EC_PLACE_NOVELTY) > ec_novel[point], EC_UNUSUAL);
+#endif
+  for (uint32_t i = 0; i < EC_TASKS; i++) {
+    answers[i].refused = false;
+    ask(i, doubts);
+  }
+}
+
+#if EC_EARLY
+/* The answer of the task's rule. */
+static bool stop(answer *a, const ec_task *task, bool sure) {
+  if (a->label >= 0 && !sure && task->rule_confidence <= 1.0) a->flags |= EC_UNSURE;
+  a->stopped_by = sure ? EC_CONFIDENCE : EC_WINDOW;
+  a->flags &= (uint16_t)~EC_TIE; /* the rule does not go by votes */
+  return true;
+}
+
+/* A product is decided when both factors are, by their labels. */
+static bool stop_product(const ec_task *task, answer *a) {
+  const answer *f[2] = {&answers[task->factors[0]], &answers[task->factors[1]]};
+  if (!decided[task->factors[0]] || !decided[task->factors[1]]) return false;
+  bool sure = f[0]->stopped_by == EC_CONFIDENCE && f[1]->stopped_by == EC_CONFIDENCE;
+  int16_t pair = -1;
+  for (uint32_t i = 0; i < task->labels; i++) {
+    bool met = task->indices[0][i] == f[0]->label && task->indices[1][i] == f[1]->label;
+    if (met && pair < 0) pair = (int16_t)i;
+  }
+  if (pair < 0 || a->label < 0) {
+    withhold(a);
+  } else {
+    a->label = pair;
+    a->confidence = rounded(1.0 * f[0]->confidence * f[1]->confidence);
+  }
+  return stop(a, task, sure);
+}
+
+/* Whether a task is decided at the decision point, by the rule certified for the error rate. */
+static bool is_decided(uint32_t index) {
+  const ec_task *task = &ec_tasks[index];
+  answer *a = &answers[index];
+  if (a->refused) return true;
+  if (!task->has_rule) {
+    a->flags |= EC_UNCERTIFIED;
+    return point == EC_POINTS - 1;
+  }
+  if (task->is_product) return stop_product(task, a);
+  bool waits = a->flags & EC_UNUSUAL;
+  double likely = confidence(&task->rule_curve, task, distances[index], a->decision_label);
+  bool sure = likely >= task->rule_confidence;
+  uint32_t last = waits ? EC_POINTS - 1 : task->rule_last;
+  if (point < last && (waits || !sure)) return false;
+  return stop(a, task, sure);
+}
+#else
+static bool is_decided(uint32_t index) {
+  (void)index;
+  return true;
+}
+#endif
+
+/* Ask at the decision point; the number of events. Factors come before their products. */
+static int decide(ec_event *events, bool is_short) {
+  static answer former[EC_TASKS];
+  int count = 0;
+  for (uint32_t i = 0; i < EC_TASKS; i++) former[i] = answers[i];
+  ask_all(is_short);
+  for (uint32_t order = 0; order < EC_TASKS; order++) {
+    uint32_t i = ec_order[order];
+    if (decided[i]) {
+      answers[i] = former[i];
+      continue;
+    }
+    if (!is_decided(i)) continue;
+    const answer *a = &answers[i];
+    ec_event event = {EC_DECIDED_EVENT, ec_now.onset_s, ec_windows_s[point], a->confidence,
+                      a->nearest, a->label, a->flags, (uint8_t)i, a->stopped_by};
+    events[count++] = event;
+    decided[i] = true;
+    waiting--;
+  }
+  return count;
+}
+
+void ec_begin(void) {
+  ec_now.under_way = false;
+  ec_now.ended = false;
+  announced = false;
+  waiting = 0;
+  last_s = -EC_INFINITY;
+}
+
+static bool usable(double x) { return x >= -1e6 && x <= 1e6; }
+
+int ec_push(
+    const uint16_t *counts, const bool *valid, double t_s, const double *joints,
+    ec_event events[EC_MOST_EVENTS]) {
+  int count = 0;
+  if (!(t_s >= last_s) || t_s - t_s != 0.0) return EC_BAD_TIME;
+  for (uint32_t i = 0; joints && i < EC_ANGLES; i++) {
+    if (!usable(joints[i])) return EC_BAD_JOINTS;
+  }
+  last_s = t_s;
+  if (ec_now.ended) announced = false;
+  int error = ec_follow(counts, valid, t_s, joints);
+  if (error) return error;
+  if (!ec_now.under_way || ec_now.frames < EC_DEBOUNCE) return 0;
+  ec_event event = {EC_ONSET_EVENT, ec_now.onset_s, 0.0, 0.0, 0, -1, 0, 0, EC_NOTHING};
+  if (!announced) {
+    announced = true;
+    events[count++] = event;
+    point = 0;
+    waiting = EC_TASKS;
+    for (uint32_t i = 0; i < EC_TASKS; i++) decided[i] = false;
+  }
+  event.kind = EC_RELEASE_EVENT;
+  if (ec_now.ended) events[count++] = event;
+  while (waiting && (ec_now.ended || t_s - ec_now.onset_s >= ec_windows_s[point])) {
+    count += decide(events + count, false);
+    point++;
+  }
+  return count;
+}
+
+int ec_finish(ec_event events[EC_MOST_EVENTS]) {
+  int count = 0;
+  point = EC_POINTS - 1;
+  if (waiting) count = decide(events, true);
+  ec_begin();
+  return count;
+}

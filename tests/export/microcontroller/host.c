@@ -1,0 +1,111 @@
+/* Answers the questions of input.bin into output.bin, on the host and under QEMU: vectors by the
+   graph's outputs, recordings by their vectors or their events. */
+#include <stdio.h>
+
+#include "internal.h"
+
+enum { VECTOR, VECTORS_OF_RECORDING, EVENTS_OF_RECORDING };
+
+typedef struct {
+  double t;
+  double joints[16];
+  uint16_t counts[EC_ROWS * EC_COLS];
+  bool valid[EC_ROWS * EC_COLS];
+  bool has_joints;
+} frame;
+
+static FILE *input;
+static FILE *output;
+
+static void take(void *to, size_t bytes) {
+  if (fread(to, 1, bytes, input) != bytes) fprintf(stderr, "input.bin is short\n");
+}
+
+static void give(const double *values, size_t count) { fwrite(values, 8, count, output); }
+
+static frame next_frame(void) {
+  static frame next;
+  take(&next.t, sizeof next.t);
+  take(next.joints, sizeof next.joints);
+  take(&next.has_joints, 1);
+  take(next.counts, sizeof next.counts);
+  take(next.valid, sizeof next.valid);
+  return next;
+}
+
+static void give_outputs(void) {
+  for (const ec_task *task = ec_tasks; task < ec_tasks + EC_TASKS; task++) {
+    give(ec_arena + task->label, 1);
+    give(ec_arena + task->scores, task->labels);
+    give(ec_arena + task->distances, task->k);
+    give(ec_arena + task->neighbours, task->k);
+    if (task->label_distances) give(ec_arena + task->label_distances, task->labels);
+  }
+  give(ec_arena + EC_PLACE_OUT_OF_RANGE, 1);
+#if EC_CALIBRATED
+  give(ec_arena + EC_PLACE_NOVELTY, 1);
+  give(ec_arena + EC_PLACE_REMOTENESS, 1);
+#endif
+}
+
+static void give_vectors(uint32_t frames) {
+  bool done = false;
+  ec_begin();
+  for (uint32_t i = 0; i < frames; i++) {
+    frame next = next_frame();
+    if (done) continue;
+    ec_follow(next.counts, next.valid, next.t, next.has_joints ? next.joints : 0);
+    bool confirmed = ec_now.under_way && ec_now.frames >= EC_DEBOUNCE;
+    done = confirmed && (ec_now.ended || ec_now.age_s >= EC_WINDOW_S);
+    done = done || (confirmed && i + 1 == frames);
+  }
+  double is_there = done;
+  give(&is_there, 1);
+  for (uint32_t point = 0; done && point < EC_POINTS; point++) {
+    ec_vector(ec_windows_s[point]);
+    give(ec_arena, EC_WIDTH);
+  }
+}
+
+static void give_events(const ec_event *events, int count) {
+  if (count < 0) fprintf(stderr, "error %d\n", count);
+  for (int i = 0; i < count; i++) {
+    const ec_event *e = &events[i];
+    double fields[9] = {e->kind,  e->onset_s, e->task, e->label,     e->window_s, e->confidence,
+                        e->flags, e->nearest, e->stopped_by};
+    give(fields, 9);
+  }
+}
+
+static void classify(uint32_t frames) {
+  ec_event events[EC_MOST_EVENTS];
+  double end[9] = {-1.0};
+  ec_begin();
+  for (uint32_t i = 0; i < frames; i++) {
+    frame next = next_frame();
+    const double *joints = next.has_joints ? next.joints : 0;
+    give_events(events, ec_push(next.counts, next.valid, next.t, joints, events));
+  }
+  give_events(events, ec_finish(events));
+  give(end, 9);
+}
+
+int main(void) {
+  uint32_t question[2];
+  input = fopen("input.bin", "rb");
+  output = fopen("output.bin", "wb");
+  if (!input || !output) return 1;
+  while (fread(question, 4, 2, input) == 2) {
+    if (question[0] == VECTOR) {
+      take(ec_arena, 8 * EC_WIDTH);
+      ec_graph(question[1]);
+      give_outputs();
+    } else if (question[0] == VECTORS_OF_RECORDING) {
+      give_vectors(question[1]);
+    } else {
+      classify(question[1]);
+    }
+  }
+  fclose(output);
+  return 0;
+}

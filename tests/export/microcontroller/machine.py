@@ -1,0 +1,138 @@
+"""A model in C, compiled and asked: by this machine, or by a Cortex-M of QEMU."""
+
+import math
+import struct
+import subprocess
+from pathlib import Path
+
+import numpy as np
+
+from edge.classifier import Classifier
+from edge.events import Decided, Onset, Release
+from edge.touch.first_contact import first_contact
+
+HERE = Path(__file__).parent
+VECTOR, VECTORS_OF_RECORDING, EVENTS_OF_RECORDING = range(3)
+WARNINGS = "-Wall -Wextra -Werror -Wconversion -Wdouble-promotion -pedantic"
+COMMON = f"-std=c99 -O2 -ffp-contract=off {WARNINGS}".split()
+SANITIZED = "-fsanitize=undefined,address -fno-sanitize-recover=all".split()
+BOARDS = {
+    "M0+": ("cortex-m0plus", "", "mps2-an385", 0x00000000, 0x20000000),
+    "M4F": (
+        "cortex-m4",
+        "-mfpu=fpv4-sp-d16 -mfloat-abi=hard",
+        "mps2-an386",
+        0,
+        0x20000000,
+    ),
+    "M33": ("cortex-m33", "", "mps2-an505", 0x10000000, 0x38000000),
+}
+"""{processor: its name for gcc, its options, QEMU's board, where code and RAM lie}. QEMU
+has no board with a Cortex-M0+ of enough memory; its code runs on a Cortex-M3."""
+FLAGS = (
+    "short missing_taxels missing_pose as_trained out_of_range unusual unknown tie unsure "
+    "uncertified".split()
+)
+"""In the order of their bits in C."""
+
+
+def compiled(folder, board=None):
+    """The command that answers `input.bin` in a folder of C."""
+    sources = [*map(str, folder.glob("*.c")), str(HERE / "host.c")]
+    sources = [source for source in sources if Path(source).name != "main.c"]
+    program = folder / f"answer-{board or 'host'}"
+    if board is None:
+        gcc = ["gcc", *COMMON, *SANITIZED]
+        command = [str(program)]
+    else:
+        cpu, options, machine, code, ram = BOARDS[board]
+        gcc = [
+            "arm-none-eabi-gcc",
+            *COMMON,
+            f"-mcpu={cpu}",
+            "-mthumb",
+            *options.split(),
+        ]
+        gcc += ["--specs=rdimon.specs", f"-Wl,--defsym=CODE={code},--defsym=RAM={ram}"]
+        gcc += ["-T", str(HERE / "board.ld"), str(HERE / "startup.c")]
+        command = (
+            f"qemu-system-arm -M {machine} -nographic -semihosting -kernel".split()
+        )
+        command.append(str(program))
+    subprocess.run([*gcc, "-I", str(folder), *sources, "-o", str(program)], check=True)
+    return command
+
+
+def ask(command, folder, questions):
+    """The numbers that answer questions."""
+    (folder / "input.bin").write_bytes(b"".join(questions))
+    subprocess.run(command, cwd=folder, check=True, timeout=1800)
+    return np.fromfile(folder / "output.bin")
+
+
+def about_vector(point, vector):
+    return struct.pack("<II", VECTOR, point) + np.asarray(vector, "<f8").tobytes()
+
+
+def about_recording(kind, recording):
+    parts = [struct.pack("<II", kind, len(recording.t))]
+    for frame in recording:
+        joints = np.zeros(16)
+        if frame.joints is not None:
+            joints[: len(frame.joints)] = frame.joints
+        valid = (
+            np.ones(frame.counts.shape, bool) if frame.valid is None else frame.valid
+        )
+        parts += [struct.pack("<d", frame.t), joints.tobytes()]
+        parts.append(struct.pack("?", frame.joints is not None))
+        parts += [frame.counts.astype("<u2").tobytes(), valid.tobytes()]
+    return b"".join(parts)
+
+
+def outputs(model, point, vector):
+    """What the graph gives, in the order of `give_outputs`."""
+    values = model.run(np.asarray(vector, float)[None], point)
+    names = [
+        f"{task}_{end}"
+        for task in model.info.tasks
+        for end in "label scores distances neighbours label_distances".split()
+    ]
+    names += ["out_of_range", "novelty", "remoteness"]
+    parts = [values[name].reshape(-1) for name in names if name in values]
+    return np.concatenate(parts).astype(float)
+
+
+def vectors(model, points, recording):
+    """As `give_vectors`."""
+    contact = first_contact(recording, model.info.tracker(recording.layout).tracker)
+    if contact is None:
+        return np.array([0.0])
+    windows_s = [model.decision_points_s[point] for point in points]
+    measured = [model.info.vector(contact[1], window_s) for window_s in windows_s]
+    return np.concatenate([[1.0], *measured])
+
+
+def events(model, recording, error=None):
+    """As `classify` in host.c, of an event a row."""
+    tasks = list(model.info.tasks)
+    rows = []
+    for event in Classifier(model, recording.layout, error=error).classify(recording):
+        if isinstance(event, Onset | Release):
+            kind = float(isinstance(event, Release))
+            rows.append([kind, event.onset_s, 0, -1, 0, 0, 0, 0, 0])
+        elif isinstance(event, Decided):
+            labels = model.info.tasks[event.task].labels
+            label = -1 if event.label is None else labels.index(event.label)
+            flags = sum(1 << i for i, flag in enumerate(FLAGS) if flag in event.flags)
+            confidence = math.nan if event.confidence is None else event.confidence
+            decision = event.decision
+            nearest = 0 if decision is None else int(decision.neighbours[0])
+            stopped = (
+                ("confidence", "window").index(event.stopped_by) + 1
+                if event.stopped_by
+                else 0
+            )
+            task = tasks.index(event.task)
+            row = [2, event.onset_s, task, label, event.window_s, confidence, flags]
+            rows.append([*row, nearest, stopped])
+    return np.array(rows, float).reshape(-1, 9)
