@@ -13,7 +13,6 @@ from edge.model.info import (
     ModelInfo,
     Stopping,
     StoppingRule,
-    check_rate,
     logistic,
     margin,
 )
@@ -191,7 +190,8 @@ def stopping_rules(model: Model, error: float) -> dict[str, StoppingRule | None]
         InputError: the rate is outside (0, 1), or is certified for no task; the message
             names the errors that are.
     """
-    check_rate(error, "the error rate")
+    if not 0.0 < error < 1.0:
+        raise InputError(f"the error rate must be above 0 and below 1, not {error:g}")
     if not model.info.decision_points_s:
         raise InputError(
             f"{model.path}: the model has no calibration, so no error rate can be "

@@ -10,7 +10,6 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 from edge.arrays import Floats
-from edge.errors import InputError
 from edge.touch.features import feature_vector, widths
 from edge.touch.layout import SkinLayout, for_device
 from edge.touch.still import WatchfulTracker
@@ -23,21 +22,6 @@ if TYPE_CHECKING:
 
 METADATA_KEY = "edge-classify"
 FORMAT = 8
-UNKNOWN = "unknown"
-"""The flag of a contact with a thing that was never met."""
-TEST_SHARE = 0.5
-"""Part of the risk that the tests on calibration trials take. The rest covers the
-exported model, which errs more or less often than the folds' models do on average."""
-
-
-def check_rate(value: float, name: str) -> None:
-    """Refuse a rate outside (0, 1).
-
-    Raises:
-        InputError: the sentence begins with `name`.
-    """
-    if not 0.0 < value < 1.0:
-        raise InputError(f"{name} must be above 0 and below 1, not {value:g}")
 
 
 @dataclass(frozen=True)
@@ -93,31 +77,29 @@ class Novelty:
 
 @dataclass(frozen=True)
 class Remoteness:
-    """When the thing is unknown: far from all in training by what tells things apart.
+    """When a thing is unknown: far from all in training by what tells things apart.
 
     Attributes:
-        task: that names things. It names none that is unknown.
-        typical, limits: as those of `Novelty`.
-        slopes, middles: (decision points,) a thing is known with the probability
-            logistic(slope * (middle - log(score / typical))).
-        worth: shares of left-out things, and `known`, see `train.model.never_met`;
-            empty where none could be left out.
+        task: that names things, and none that is unknown.
+        limits: (decision points,) scores that few things in training exceed.
+        middles: (decision points,) scores at which a thing is as likely known as not.
+        slopes: (decision points,) by which the odds fall with the score's logarithm.
+        worth: shares of things that were left out, see `train.model.never_met`; empty
+            where none could be.
     """
 
     task: str
-    typical: tuple[float, ...]
     limits: tuple[float, ...]
-    slopes: tuple[float, ...]
     middles: tuple[float, ...]
+    slopes: tuple[float, ...]
     worth: Mapping[str, float] = field(default_factory=dict)
 
     def known(self, decision_point: int, score: float) -> float:
         """Probability, 0 to 1, that the thing is one of those in training."""
-        typical = self.typical[decision_point]
-        if not score > 0.0 < typical:
+        if score <= 0.0:
             return 1.0
-        nearer = self.middles[decision_point] - math.log(score / typical)
-        return logistic(self.slopes[decision_point] * nearer)
+        log_odds = math.log(self.middles[decision_point] / score)
+        return logistic(self.slopes[decision_point] * log_odds)
 
 
 def margin(distances: Sequence[float], label: int) -> float:

@@ -159,25 +159,18 @@ def read_novelty(table: ConfigTable, points: int) -> Novelty:
     Raises:
         InputError: the table is damaged.
     """
-    return Novelty(
-        typical=table.numbers("typical", points, low=0.0),
-        limits=table.numbers("limits", points, low=0.0),
-    )
+    typical = table.numbers("typical", points, low=0.0)
+    return Novelty(typical, table.numbers("limits", points, low=0.0))
 
 
 def read_remoteness(table: ConfigTable, points: int) -> Remoteness:
-    """The limits of remoteness, of a model with this number of decision points.
-
-    Raises:
-        InputError: the table is damaged.
-    """
+    """As `read_novelty`, of remoteness."""
     worth = table.table("worth")
     return Remoteness(
         task=table.text("task"),
-        typical=table.numbers("typical", points, low=0.0),
         limits=table.numbers("limits", points, low=0.0),
+        middles=table.numbers("middles", points, low=1e-9),
         slopes=table.numbers("slopes", points, low=0.0),
-        middles=table.numbers("middles", points),
         worth={name: worth.number(name, low=0.0, high=1.0) for name in worth.raw},
     )
 

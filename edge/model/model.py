@@ -276,14 +276,12 @@ class Model:
         novelty = float(answers.get("novelty", 0.0))
         remoteness = float(answers.get("remoteness", 0.0))
         confidence = None
-        if self.info.novelty is not None:
+        if self.info.novelty is not None and self.info.remoteness is not None:
             excess = self.info.novelty.excess(point, novelty)
-            confidence = self.info.stopping[task].confidence(
-                point, distances.tolist(), label, excess
-            )
-        names = self.info.remoteness
-        if names is not None and names.task == task and confidence is not None:
-            confidence *= names.known(point, remoteness)
+            evidence = distances.tolist(), label, excess
+            confidence = self.info.stopping[task].confidence(point, *evidence)
+            if task == self.info.remoteness.task:
+                confidence *= self.info.remoteness.known(point, remoteness)
         return Decision(
             label=self.info.tasks[task].labels[label],
             confidence=confidence,

@@ -33,7 +33,6 @@ from joblib import cpu_count
 from numpy.typing import NDArray
 from scipy.stats import binom
 
-from edge.model.info import UNKNOWN
 from edge.model.model import Model
 from edge.touch.features import SAMPLES, WINDOW_S
 from export.api import save
@@ -207,7 +206,7 @@ def exported(seed):
         model = Model(f"{folder}/model.onnx")
     fresh = scenes.load(SCENE, seed=FRESH_SEED, count=FRESH)
     rows = decisions(model, fresh_touches(fresh)).drop_duplicates(["task", "touch"])
-    rows["unknown"] = [UNKNOWN in flags for flags in rows["flags"]]
+    rows["unknown"] = ["unknown" in flags for flags in rows["flags"]]
     rows["right"] = [answer.label for answer in rows["decision"]] == rows["truth"]
     judged_rows = []
     for task, of_task in rows.groupby("task", sort=False):

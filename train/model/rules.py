@@ -33,7 +33,8 @@ from scipy.special import expit
 from scipy.stats import beta
 
 from edge.arrays import Booleans, Floats, Integers
-from edge.model.info import TEST_SHARE, StoppingRule
+from edge.model.info import StoppingRule
+from edge.model.refusal import TEST_SHARE
 
 RISK = 0.1
 """Probability that a certificate is wrong."""

@@ -8,19 +8,17 @@ import numpy as np
 import pytest
 
 from edge.config import ConfigTable
-from edge.early import is_sure
+from edge.early import is_sure, stopping_rules
 from edge.errors import InputError
 from edge.model.info import (
-    TEST_SHARE,
     Novelty,
     Remoteness,
     Stopping,
     StoppingRule,
-    check_rate,
     margin,
 )
 from edge.model.metadata_reader import read_novelty, read_remoteness, read_stopping
-from edge.model.refusal import refusal
+from edge.model.refusal import TEST_SHARE, refusal
 from edge.model.unusual import unusual
 
 
@@ -116,10 +114,9 @@ def test_where_the_full_window_errs_more_often_trials_do_not_help():
 
 REMOTENESS = Remoteness(
     "t",
-    typical=(1.0, 2.0),
     limits=(3.0, 4.0),
+    middles=(math.e, 2.0),
     slopes=(1.0, 5.0),
-    middles=(1.0, 0.0),
     worth={"unknown": 0.46, "sure": 0.09},
 )
 
@@ -156,7 +153,7 @@ def test_what_contradicts_itself_is_no_stopping(changes, says):
     ("changes", "says"),
     [
         ({"limits": (1.0,)}, "limits must be a list of 2 numbers, not"),
-        ({"typical": (1.0, -1.0)}, "typical must be a number of at least 0, not -1.0"),
+        ({"slopes": (1.0, -1.0)}, "slopes must be a number of at least 0, not -1.0"),
         ({"worth": {"sure": 1.5}}, "worth.sure must be a number from 0 to 1, not 1.5"),
     ],
 )
@@ -171,12 +168,6 @@ def test_damaged_limits_are_refused(changes, says):
 )
 def test_the_farther_a_thing_the_less_likely_it_is_known(point, score, known):
     assert REMOTENESS.known(point, score) == pytest.approx(known)
-
-
-@pytest.mark.parametrize("value", [0.0, 1.0, math.nan])
-def test_a_rate_lies_inside_0_to_1(value):
-    with pytest.raises(InputError, match="must be above 0 and below 1"):
-        check_rate(value, "the error rate")
 
 
 @pytest.mark.parametrize(
@@ -200,3 +191,9 @@ def test_only_a_rule_that_no_confidence_meets_waits_for_a_fixed_window(
     confidence, fixed
 ):
     assert StoppingRule(0.1, 1.0, confidence, 3).fixed is fixed
+
+
+@pytest.mark.parametrize("error", [0.0, 1.0, math.nan])
+def test_an_error_rate_lies_inside_0_to_1(error):
+    with pytest.raises(InputError, match="must be above 0 and below 1"):
+        stopping_rules(None, error)
