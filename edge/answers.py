@@ -110,8 +110,8 @@ def _answer(
         out_of_range=decision.out_of_range,
         tie=decision.tie,
     )
-    names = info.remoteness
-    if names is None or names.task != blank.task:
-        return answer
-    is_unknown = decision.remoteness > names.limits[point]
-    return answer.withheld() if is_unknown else answer
+    if blank.task in info.stopping:
+        doubt = info.stopping[blank.task].remoteness
+        if doubt is not None and decision.remoteness > doubt.limits[point]:
+            return answer.withheld()
+    return answer

@@ -80,7 +80,6 @@ class Remoteness:
     """When a thing is unknown: far from all in training by what tells things apart.
 
     Attributes:
-        task: that names things, and none that is unknown.
         limits: (decision points,) scores that few things in training exceed.
         middles: (decision points,) scores at which a thing is as likely known as not.
         slopes: (decision points,) by which the odds fall with the score's logarithm.
@@ -88,7 +87,6 @@ class Remoteness:
             where none could be.
     """
 
-    task: str
     limits: tuple[float, ...]
     middles: tuple[float, ...]
     slopes: tuple[float, ...]
@@ -168,6 +166,7 @@ class Stopping:
         trials: number of trials that certify the rules.
         wrong: number of these trials that are decided wrongly at the full window.
         risk: probability that a rule errs more often than its certificate says.
+        remoteness: of the task that names things, and none that is unknown; else None.
     """
 
     slopes: tuple[float, ...]
@@ -180,6 +179,7 @@ class Stopping:
     trials: int
     wrong: int
     risk: float
+    remoteness: Remoteness | None = None
 
     @property
     def smallest_error(self) -> float:
@@ -192,6 +192,7 @@ class Stopping:
         distances: Sequence[float],
         label: int,
         excess: float,
+        remoteness: float = 0.0,
     ) -> float:
         """Probability, 0 to 1, that a label is right.
 
@@ -200,10 +201,14 @@ class Stopping:
             distances: (labels,) of `edge.model.Decision.label_distances`.
             label: its index.
             excess: the contact's `Novelty.excess`.
+            remoteness: of the contact.
         """
         log_odds = self.slopes[decision_point] * margin(distances, label)
         log_odds += self.intercepts[decision_point]
-        return logistic(log_odds - self.doubts[decision_point] * excess)
+        likely = logistic(log_odds - self.doubts[decision_point] * excess)
+        if self.remoteness is not None:
+            likely *= self.remoteness.known(decision_point, remoteness)
+        return likely
 
     def rule(self, error: float) -> StoppingRule | None:
         """The fastest rule that is certified for an error rate; or None."""
@@ -237,8 +242,6 @@ class ModelInfo:
     """The stopping rules of each task; empty without decision points."""
     novelty: Novelty | None = None
     """The limits of novelty; None without decision points."""
-    remoteness: Remoteness | None = None
-    """The limits of remoteness; None without decision points."""
     joints: int = 0
     """Number of joint angles in a frame, if a feature is made of them; else 0."""
     kernels: Mapping[str, KernelTable] = field(default_factory=dict)

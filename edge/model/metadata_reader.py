@@ -67,13 +67,11 @@ def _read(meta: ConfigTable) -> ModelInfo:
         chain = Chain.from_dict(arm, where=f"{meta.where}: arm")
     stopping = {}
     novelty = None
-    remoteness = None
     if points:
         rules = meta.table("stopping")
         for task in rules.raw:
             stopping[task] = read_stopping(rules.table(task), len(points))
         novelty = read_novelty(meta.table("novelty"), len(points))
-        remoteness = read_remoteness(meta.table("remoteness"), len(points))
     info = ModelInfo(
         tasks=task_of,
         layout=layout,
@@ -90,7 +88,6 @@ def _read(meta: ConfigTable) -> ModelInfo:
         decision_points_s=points,
         stopping=stopping,
         novelty=novelty,
-        remoteness=remoteness,
         joints=meta.whole("joints", 0, allowed=range(0, 1001)),
         kernels=_kernels(meta, names, layout),
         name=meta.text("name", "", empty=True),
@@ -131,6 +128,9 @@ def read_stopping(table: ConfigTable, points: int) -> Stopping:
         InputError: the table is damaged.
     """
     trials = table.whole("trials", allowed=range(1, 1 << 31))
+    remoteness = table.get("remoteness", None)
+    if remoteness is not None:
+        remoteness = read_remoteness(table.table("remoteness"), points)
     return Stopping(
         slopes=table.numbers("slopes", points, low=0.0, open_low=True),
         intercepts=table.numbers("intercepts", points),
@@ -150,6 +150,7 @@ def read_stopping(table: ConfigTable, points: int) -> Stopping:
         trials=trials,
         wrong=table.whole("wrong", allowed=range(trials + 1)),
         risk=table.number("risk", low=0.0, high=1.0, open_low=True),
+        remoteness=remoteness,
     )
 
 
@@ -164,10 +165,9 @@ def read_novelty(table: ConfigTable, points: int) -> Novelty:
 
 
 def read_remoteness(table: ConfigTable, points: int) -> Remoteness:
-    """As `read_novelty`, of remoteness."""
+    """As `read_stopping`, of remoteness."""
     worth = table.table("worth")
     return Remoteness(
-        task=table.text("task"),
         limits=table.numbers("limits", points, low=0.0),
         middles=table.numbers("middles", points, low=1e-9),
         slopes=table.numbers("slopes", points, low=0.0),
@@ -255,5 +255,4 @@ def _points_fit(info: ModelInfo) -> bool:
     rising = sorted({0.0, *points}) == [0.0, *points]
     if not rising or points[-1] != info.window_s:
         return False
-    named = info.remoteness is not None and info.remoteness.task in info.tasks
-    return named and info.stopping.keys() == info.tasks.keys()
+    return info.stopping.keys() == info.tasks.keys()

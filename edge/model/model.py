@@ -276,12 +276,14 @@ class Model:
         novelty = float(answers.get("novelty", 0.0))
         remoteness = float(answers.get("remoteness", 0.0))
         confidence = None
-        if self.info.novelty is not None and self.info.remoteness is not None:
-            excess = self.info.novelty.excess(point, novelty)
-            evidence = distances.tolist(), label, excess
-            confidence = self.info.stopping[task].confidence(point, *evidence)
-            if task == self.info.remoteness.task:
-                confidence *= self.info.remoteness.known(point, remoteness)
+        if self.info.novelty is not None:
+            confidence = self.info.stopping[task].confidence(
+                point,
+                distances.tolist(),
+                label,
+                self.info.novelty.excess(point, novelty),
+                remoteness,
+            )
         return Decision(
             label=self.info.tasks[task].labels[label],
             confidence=confidence,

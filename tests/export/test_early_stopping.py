@@ -268,8 +268,10 @@ def test_an_unknown_thing_has_no_name_but_a_kind_at_once(
     hasty, make_touch, monkeypatch, early_ones
 ):
     model, error = hasty
-    nowhere = replace(model.info.remoteness, limits=(0.0, 0.0, 0.0))
-    monkeypatch.setattr(model, "info", replace(model.info, remoteness=nowhere))
+    stopping = model.info.stopping["object"]
+    nowhere = replace(stopping.remoteness, limits=(0.0, 0.0, 0.0))
+    unmet = replace(stopping, remoteness=nowhere)
+    monkeypatch.setitem(model.info.stopping, "object", unmet)
     touch = make_touch(kind="hard", seed=50)
     events = decided(model, touch, error if early_ones else None)
     assert events["object"].label is None

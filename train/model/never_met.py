@@ -47,11 +47,10 @@ def thing_folds(labels: Strings) -> Integers | None:
     return np.where(labels == "", -1, group_folds(labels, MOST_FOLDS))
 
 
-def remoteness_of(task: str, known: Floats, left_out: Floats | None) -> Remoteness:
+def remoteness_of(known: Floats, left_out: Floats | None) -> Remoteness:
     """The limits and the curves of remoteness.
 
     Args:
-        task: that names things.
         known: (decision points, n) remoteness of contacts held out by themselves.
         left_out: (decision points, m) of those with things that were left out; None
             where none could be.
@@ -59,9 +58,9 @@ def remoteness_of(task: str, known: Floats, left_out: Floats | None) -> Remotene
     typical, limits = limits_of(known, UNKNOWN_RATE)
     if left_out is None:
         middles = tuple(USUAL_MIDDLE * score for score in typical)
-        return Remoteness(task, limits, middles, (USUAL_SLOPE,) * len(middles))
+        return Remoteness(limits, middles, (USUAL_SLOPE,) * len(middles))
     middles, slopes = zip(*map(_curve, known, left_out), strict=True)
-    return Remoteness(task, limits, middles, slopes)
+    return Remoteness(limits, middles, slopes)
 
 
 def known_of(remoteness: Remoteness, scores: Floats) -> Floats:

@@ -113,7 +113,6 @@ def test_where_the_full_window_errs_more_often_trials_do_not_help():
 
 
 REMOTENESS = Remoteness(
-    "t",
     limits=(3.0, 4.0),
     middles=(math.e, 2.0),
     slopes=(1.0, 5.0),

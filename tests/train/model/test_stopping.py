@@ -88,7 +88,8 @@ def test_an_unknown_thing_is_an_error_of_the_task_that_then_names_nothing():
     things = np.char.add(labels, np.where(X[1, :, 1] > 0, "+", "-"))
     choices = {"kind": Choice("none", 12, 1), "thing": Choice("none", 12, 1)}
     model = calibrated(choices, X, {"kind": labels, "thing": things})
-    assert model.remoteness_.task == "thing"
+    assert model.stopping_["thing"].remoteness is not None
+    assert model.stopping_["kind"].remoteness is None
     unknown = model.unknown_[-1]
     right = {task: answers[-1] for task, answers in model.right_.items()}
     assert 0 < (unknown & right["thing"]).sum() < 10
