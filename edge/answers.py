@@ -102,7 +102,7 @@ def _answer(
     answer = replace(
         blank,
         label=decision.label,
-        confidence=None if confidence is None else round(confidence, 6),
+        confidence=confidence and round(confidence, 6),
         nearest=tuple(map(info.trial, decision.neighbours.tolist())),
         decision=decision,
     ).flagged(
@@ -110,8 +110,13 @@ def _answer(
         out_of_range=decision.out_of_range,
         tie=decision.tie,
     )
-    if blank.task in info.stopping:
-        doubt = info.stopping[blank.task].remoteness
-        if doubt is not None and decision.remoteness > doubt.limits[point]:
-            return answer.withheld()
+    stopping = info.stopping.get(blank.task)
+    doubt = stopping and stopping.remoteness
+    if doubt and decision.remoteness > doubt.limits[point]:
+        return withheld(answer)
     return answer
+
+
+def withheld(answer: Decided) -> Decided:
+    """The answer without a label, flagged as `unknown`."""
+    return replace(answer, label=None, confidence=0.0).flagged(unknown=True)

@@ -6,6 +6,7 @@ import logging
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
+from edge.answers import withheld
 from edge.errors import InputError
 from edge.events import Decided
 from edge.model.agreement import product_label
@@ -48,6 +49,11 @@ def is_sure(
     """Whether a label is sure enough for a rule; see `Stopping.confidence`."""
     log_odds = stopping.slope * margin(distances, label) + stopping.intercept
     return logistic(log_odds - stopping.doubt * excess) >= rule.confidence
+
+
+def is_fixed(rule: StoppingRule) -> bool:
+    """Whether a rule waits for a fixed window."""
+    return rule.confidence > 1.0
 
 
 class Uncertified:
@@ -128,7 +134,7 @@ class Early:
 
     def _answered(self, candidate: Decided, sure: bool) -> Decided:
         """The answer of the rule."""
-        if candidate.label is not None and not sure and not self._rule.fixed:
+        if candidate.label is not None and not sure and not is_fixed(self._rule):
             candidate = candidate.flagged(unsure=True)
         stopped_by = "confidence" if sure else "window"
         answer = replace(candidate, error=self._error, stopped_by=stopped_by)
@@ -160,7 +166,7 @@ class Product(Early):
             sure = sure and answer.stopped_by == "confidence"
         index = product_label(factors, indices)
         if index is None or candidate.label is None:
-            return self._answered(candidate.withheld(), sure)
+            return self._answered(withheld(candidate), sure)
         label = self._task.labels[index]
         decision = _decision(candidate)._replace(label=label)
         confidence = round(confidence, 6)
@@ -198,7 +204,7 @@ def stopping_rules(model: Model, error: float) -> dict[str, StoppingRule | None]
             "held; export it with --decision-points"
         )
     rules = {
-        task: stopping.rule(error) for task, stopping in model.info.stopping.items()
+        task: fastest(stopping, error) for task, stopping in model.info.stopping.items()
     }
     if not any(rules.values()):
         reasons = (
@@ -209,6 +215,12 @@ def stopping_rules(model: Model, error: float) -> dict[str, StoppingRule | None]
             f"{'; '.join(reasons)}"
         )
     return rules
+
+
+def fastest(stopping: Stopping, error: float) -> StoppingRule | None:
+    """The fastest rule that is certified for an error rate; or None."""
+    certified = [rule for rule in stopping.rules if rule.error <= error]
+    return certified[-1] if certified else None
 
 
 def log_rules(model: Model, error: float) -> None:
@@ -224,7 +236,7 @@ def log_rules(model: Model, error: float) -> None:
                 f"cannot be certified: {refusal(model.info.stopping[task], error)}"
             )
             continue
-        if rule.fixed:
+        if is_fixed(rule):
             time = f"always after {model.decision_points_s[rule.last]:g} s"
         else:
             time = f"when sure, in training after {rule.mean_s:.2f} s on average"

@@ -143,11 +143,6 @@ class StoppingRule:
     confidence: float
     last: int
 
-    @property
-    def fixed(self) -> bool:
-        """Whether the rule waits for a fixed window."""
-        return self.confidence > 1.0
-
 
 @dataclass(frozen=True)
 class Stopping:
@@ -181,11 +176,6 @@ class Stopping:
     risk: float
     remoteness: Remoteness | None = None
 
-    @property
-    def smallest_error(self) -> float:
-        """The smallest error rate that is certified."""
-        return self.rules[0].error
-
     def confidence(
         self,
         decision_point: int,
@@ -206,14 +196,9 @@ class Stopping:
         log_odds = self.slopes[decision_point] * margin(distances, label)
         log_odds += self.intercepts[decision_point]
         likely = logistic(log_odds - self.doubts[decision_point] * excess)
-        if self.remoteness is not None:
-            likely *= self.remoteness.known(decision_point, remoteness)
-        return likely
-
-    def rule(self, error: float) -> StoppingRule | None:
-        """The fastest rule that is certified for an error rate; or None."""
-        certified = [rule for rule in self.rules if rule.error <= error]
-        return certified[-1] if certified else None
+        if self.remoteness is None:
+            return likely
+        return likely * self.remoteness.known(decision_point, remoteness)
 
 
 @dataclass(frozen=True)

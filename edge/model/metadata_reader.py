@@ -69,9 +69,12 @@ def _read(meta: ConfigTable) -> ModelInfo:
     novelty = None
     if points:
         rules = meta.table("stopping")
+        count = len(points)
         for task in rules.raw:
-            stopping[task] = read_stopping(rules.table(task), len(points))
-        novelty = read_novelty(meta.table("novelty"), len(points))
+            stopping[task] = read_stopping(rules.table(task), count)
+        table = meta.table("novelty")
+        typical = table.numbers("typical", count, low=0.0)
+        novelty = Novelty(typical, table.numbers("limits", count, low=0.0))
     info = ModelInfo(
         tasks=task_of,
         layout=layout,
@@ -128,8 +131,8 @@ def read_stopping(table: ConfigTable, points: int) -> Stopping:
         InputError: the table is damaged.
     """
     trials = table.whole("trials", allowed=range(1, 1 << 31))
-    remoteness = table.get("remoteness", None)
-    if remoteness is not None:
+    remoteness = None
+    if table.has("remoteness"):
         remoteness = read_remoteness(table.table("remoteness"), points)
     return Stopping(
         slopes=table.numbers("slopes", points, low=0.0, open_low=True),
@@ -154,18 +157,12 @@ def read_stopping(table: ConfigTable, points: int) -> Stopping:
     )
 
 
-def read_novelty(table: ConfigTable, points: int) -> Novelty:
-    """The limits of novelty, of a model with this number of decision points.
+def read_remoteness(table: ConfigTable, points: int) -> Remoteness:
+    """The doubt about names, of a model with this number of decision points.
 
     Raises:
         InputError: the table is damaged.
     """
-    typical = table.numbers("typical", points, low=0.0)
-    return Novelty(typical, table.numbers("limits", points, low=0.0))
-
-
-def read_remoteness(table: ConfigTable, points: int) -> Remoteness:
-    """As `read_stopping`, of remoteness."""
     worth = table.table("worth")
     return Remoteness(
         limits=table.numbers("limits", points, low=0.0),
@@ -253,6 +250,5 @@ def _points_fit(info: ModelInfo) -> bool:
     """Whether decision points rise to the window, and each task has its rules."""
     points = info.decision_points_s
     rising = sorted({0.0, *points}) == [0.0, *points]
-    if not rising or points[-1] != info.window_s:
-        return False
-    return info.stopping.keys() == info.tasks.keys()
+    ends = points[-1] == info.window_s
+    return rising and ends and info.stopping.keys() == info.tasks.keys()

@@ -15,7 +15,7 @@ def refusal(stopping: Stopping, error: float) -> str:
     share = stopping.wrong / stopping.trials
     sentence = (
         f"the smallest error that {stopping.trials} calibration trials certify is "
-        f"{stopping.smallest_error:.3f}"
+        f"{stopping.rules[0].error:.3f}"
     )
     if share >= error:
         return (

@@ -33,6 +33,7 @@ from joblib import cpu_count
 from numpy.typing import NDArray
 from scipy.stats import binom
 
+from edge.early import fastest
 from edge.model.model import Model
 from edge.touch.features import SAMPLES, WINDOW_S
 from export.api import save
@@ -157,12 +158,12 @@ def certificates(task, stopping, course):
     """A row for each request: the certified error, the share wrong, and the promised
     and the realised mean seconds, which are missing where the request is refused. The
     first request is the smallest error that is certified."""
-    requests = {"the smallest": stopping.smallest_error}
+    requests = {"the smallest": stopping.rules[0].error}
     requests |= {f"{error:g}": error for error in ERRORS}
     for name, error in requests.items():
         row = {"task": task, "asked": name, "error": error}
         row |= dict.fromkeys(("wrong", "promised, s", "realised, s"), np.nan)
-        rule = stopping.rule(error)
+        rule = fastest(stopping, error)
         if rule is not None:
             at, wrong = course.under(rule)
             row["wrong"] = wrong.mean()

@@ -12,7 +12,7 @@ from onnxruntime import GraphOptimizationLevel
 
 import train
 from edge.classifier import Classifier
-from edge.early import stopping_rules
+from edge.early import fastest, is_fixed, stopping_rules
 from edge.errors import InputError
 from edge.events import Decided
 from edge.model.model import Model
@@ -51,7 +51,7 @@ def early(folder):
 @pytest.fixture
 def error(early):
     """The smallest error that is certified for category."""
-    return early.info.stopping["category"].smallest_error
+    return early.info.stopping["category"].rules[0].error
 
 
 def decided(model, recording, error):
@@ -167,7 +167,7 @@ def test_the_board_stops_where_the_rule_does(early, make_touch, error):
         touch = make_touch(kind="soft", seed=seed)
         decision = decided(early, touch, error)["category"].to_dict()
         assert decision["window_s"] in early.decision_points_s[: rule.last + 1]
-        assert decision["stopped_by"] == ("window" if rule.fixed else "confidence")
+        assert decision["stopped_by"] == ("window" if is_fixed(rule) else "confidence")
         assert decision["error"] == error
         assert 0.0 <= decision["confidence"] <= 1.0
 
@@ -235,7 +235,7 @@ def hasty(early, monkeypatch):
         rule = replace(stopping.rules[0], confidence=0.0)
         hurried = replace(stopping, rules=(rule,))
         monkeypatch.setitem(early.info.stopping, task, hurried)
-        smallest.append(hurried.smallest_error)
+        smallest.append(rule.error)
     return early, max(smallest)
 
 
@@ -358,9 +358,9 @@ def test_the_board_decides_as_the_trials_that_certified_its_rules_were(
         for task in model.info.tasks
     }
     _, _, courses = fitted.sequential.judged(np.array(vectors), truth)
-    error = model.info.stopping["category"].smallest_error
+    error = model.info.stopping["category"].rules[0].error
     for task, course in courses.items():
-        at, wrong = course.under(model.info.stopping[task].rule(error))
+        at, wrong = course.under(fastest(model.info.stopping[task], error))
         for i, recording in enumerate(recordings):
             event = decided(model, recording, error)[task]
             assert event.window_s == model.decision_points_s[at[i]]

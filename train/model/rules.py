@@ -33,6 +33,7 @@ from scipy.special import expit
 from scipy.stats import beta
 
 from edge.arrays import Booleans, Floats, Integers
+from edge.early import is_fixed
 from edge.model.info import StoppingRule
 from edge.model.refusal import TEST_SHARE
 
@@ -133,7 +134,7 @@ def certify(course: Course, seconds: Floats) -> list[StoppingRule]:
             passed.append(tested(rule, full_level / len(families), before))
             before = passed[-1].error
     # Among equal rules the fixed window comes first, as it needs no confidence.
-    passed.sort(key=lambda rule: (rule.error, rule.mean_s, not rule.fixed))
+    passed.sort(key=lambda rule: (rule.error, rule.mean_s, not is_fixed(rule)))
     best: list[StoppingRule] = []
     for rule in passed:
         if rule.error < 1.0 and (not best or rule.mean_s < best[-1].mean_s - 1e-9):

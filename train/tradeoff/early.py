@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from edge.arrays import Booleans, Floats, Integers
+from edge.early import fastest
 from edge.model.info import Stopping, StoppingRule
 from train.choose.evaluate import Promise, Result
 from train.data.dataset import DataSet
@@ -194,7 +195,7 @@ def _compared(
     for error in ERRORS:
         allowed = []
         for fold in folds:
-            rule = fold.stopping[task].rule(error)
+            rule = fastest(fold.stopping[task], error)
             if rule is not None:
                 allowed.append((fold.courses[task], rule))
         if allowed:

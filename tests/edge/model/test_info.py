@@ -8,16 +8,15 @@ import numpy as np
 import pytest
 
 from edge.config import ConfigTable
-from edge.early import is_sure, stopping_rules
+from edge.early import fastest, is_fixed, is_sure, stopping_rules
 from edge.errors import InputError
 from edge.model.info import (
-    Novelty,
     Remoteness,
     Stopping,
     StoppingRule,
     margin,
 )
-from edge.model.metadata_reader import read_novelty, read_remoteness, read_stopping
+from edge.model.metadata_reader import read_remoteness, read_stopping
 from edge.model.refusal import TEST_SHARE, refusal
 from edge.model.unusual import unusual
 
@@ -53,8 +52,8 @@ def stopping(**changes):
 
 
 def test_the_fastest_rule_that_is_certified_is_taken():
-    assert stopping().rule(0.05) is None
-    assert [stopping().rule(error).mean_s for error in (0.1, 0.2, 0.9)] == [
+    assert fastest(stopping(), 0.05) is None
+    assert [fastest(stopping(), error).mean_s for error in (0.1, 0.2, 0.9)] == [
         1.2,
         0.8,
         0.4,
@@ -126,8 +125,6 @@ def table(stored):
 
 def test_what_is_stored_is_read_again():
     assert read_stopping(table(stopping()), 3) == stopping()
-    novelty = Novelty((1.0, 2.0), (3.0, 4.0))
-    assert read_novelty(table(novelty), 2) == novelty
     assert read_remoteness(table(REMOTENESS), 2) == REMOTENESS
 
 
@@ -189,7 +186,7 @@ def test_what_is_farthest_from_its_usual_range_is_said(means, phrase):
 def test_only_a_rule_that_no_confidence_meets_waits_for_a_fixed_window(
     confidence, fixed
 ):
-    assert StoppingRule(0.1, 1.0, confidence, 3).fixed is fixed
+    assert is_fixed(StoppingRule(0.1, 1.0, confidence, 3)) is fixed
 
 
 @pytest.mark.parametrize("error", [0.0, 1.0, math.nan])

@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 from scipy.special import logit
 
+from edge.early import fastest
 from edge.errors import InputError
 from train.data.folds import stratified_folds
 from train.model.held_out import answers
@@ -46,7 +47,7 @@ def touches(n, seed=0):
 def test_what_is_plain_from_the_second_decision_point_on_is_decided_there():
     X, labels = touches(120)
     model = calibrated(of_neighbours(3), X, {"t": labels})
-    assert model.stopping_["t"].rule(0.1).mean_s <= 0.83
+    assert fastest(model.stopping_["t"], 0.1).mean_s <= 0.83
     new, truth = touches(300, seed=1)
     named, _ = answers(model.decision_points_, new)["t"]
     assert (named[1:] == truth).all()
