@@ -139,7 +139,7 @@ def judge(model, touch):
     summary.add(recording.labels, events)
     row = {"trials": habit, "kind": recording.labels["object"]}
     row |= {f"{task} right": summary.right(task)[0] for task in TASKS}
-    row["unknown"] = int(any("unknown" in event.get("flags", ()) for event in events))
+    row["unknown"] = int(any("unusual" in event.get("flags", ()) for event in events))
     return row | {"number": 1}
 
 
