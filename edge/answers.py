@@ -52,25 +52,19 @@ def answers_about(
         return {task: replace(answer, task=task) for task in info.tasks}
     if any(decision.label in info.several_labels for decision in decisions.values()):
         answer = answer.flagged(several=False)
-    answers = {
-        task: _answer(replace(answer, task=task), decision, info)
-        for task, decision in decisions.items()
-    }
-    if info.novelty is not None and info.remoteness is not None:
-        name = info.remoteness.task
-        asked = decisions[name]
-        if asked.remoteness > info.remoteness.limits[point]:
-            answers[name] = answers[name].withheld()
-        if asked.novelty > info.novelty.limits[point]:
+    if info.novelty is not None:
+        score = next(iter(decisions.values())).novelty
+        is_unusual = score > info.novelty.limits[point]
+        answer = answer.flagged(unusual=is_unusual)
+        if is_unusual and window_s == info.window_s:
             from edge.model.unusual import unusual  # few contacts are unusual
 
-            is_full = window_s == info.window_s
-            phrase = unusual(vector, info.widths, info.usual) if is_full else None
-            answers = {
-                task: replace(answer, unusual=phrase).flagged(unusual=True)
-                for task, answer in answers.items()
-            }
-    return answers
+            phrase = unusual(vector, info.widths, info.usual)
+            answer = replace(answer, unusual=phrase)
+    return {
+        task: _answer(replace(answer, task=task), decision, info, point)
+        for task, decision in decisions.items()
+    }
 
 
 def contact_doubts(
@@ -105,13 +99,18 @@ def _position(contact: Contact) -> tuple[float, float, float] | None:
     return x, y, z
 
 
-def _answer(blank: Decided, decision: Decision, info: ModelInfo) -> Decided:
+def _answer(
+    blank: Decided,
+    decision: Decision,
+    info: ModelInfo,
+    point: int,
+) -> Decided:
     """A task's answer, with the doubts of the decision."""
     confidence = decision.confidence
-    return replace(
+    answer = replace(
         blank,
         label=decision.label,
-        confidence=None if confidence is None else round(confidence, 6),
+        confidence=confidence and round(confidence, 6),
         nearest=tuple(map(info.trial, decision.neighbours.tolist())),
         decision=decision,
     ).flagged(
@@ -119,3 +118,13 @@ def _answer(blank: Decided, decision: Decision, info: ModelInfo) -> Decided:
         out_of_range=decision.out_of_range,
         tie=decision.tie,
     )
+    stopping = info.stopping.get(blank.task)
+    doubt = stopping and stopping.remoteness
+    if doubt and decision.remoteness > doubt.limits[point]:
+        return withheld(answer)
+    return answer
+
+
+def withheld(answer: Decided) -> Decided:
+    """The answer without a label, flagged as `unknown`."""
+    return replace(answer, label=None, confidence=0.0).flagged(unknown=True)

@@ -76,11 +76,11 @@ class Classifier:
     certified for that rate: it is decided at the first decision point that is sure
     enough, and at the rule's last in any case (see `edge.model.info`). A task for
     which no rule is certified is decided at the full window, flagged `uncertified`. A
-    task that is the product of two others, as category is of softness and mobility, is
-    decided when both are, by their labels, and they follow its rule; where they have
-    faster ones, it waits for a fixed window. An unknown contact waits for the full
-    window, and the label of the task with the most labels, such as the object, is then
-    "unknown". `unsure` flags that the window ended before the confidence was reached.
+    task that is the product of two others, as category is of softness and mobility,
+    never contradicts them: it is decided when both are, by their labels, and they
+    follow its rule where it has one; where they have faster ones, it waits for a fixed
+    window. An unusual contact waits for the full window. `unsure` flags that the window
+    ended before the confidence was reached.
 
     A decision has flags, the reasons to doubt it: see `edge.flags`.
 

@@ -6,6 +6,7 @@ import logging
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
+from edge.answers import withheld
 from edge.elementary import logistic
 from edge.errors import InputError
 from edge.events import Decided
@@ -14,7 +15,6 @@ from edge.model.info import (
     ModelInfo,
     Stopping,
     StoppingRule,
-    check_rate,
     margin,
 )
 from edge.model.model import Decision, Model
@@ -35,7 +35,7 @@ def policies(model: Model, error: float) -> Mapping[str, Policy]:
             policy_of[task] = Uncertified(model.info)
         else:
             # At a fixed window a product needs no answers of its factors.
-            waits = task in model.info.products and not rule.fixed
+            waits = task in model.info.products and not is_fixed(rule)
             kind = Product if waits else Early
             policy_of[task] = kind(model.info, task, rule, error)
     return policy_of
@@ -51,6 +51,11 @@ def is_sure(
     """Whether a label is sure enough for a rule; see `Stopping.confidence`."""
     log_odds = stopping.slope * margin(distances, label) + stopping.intercept
     return logistic(log_odds - stopping.doubt * excess) >= rule.confidence
+
+
+def is_fixed(rule: StoppingRule) -> bool:
+    """Whether a rule waits for a fixed window."""
+    return rule.confidence > 1.0
 
 
 class Uncertified:
@@ -131,7 +136,7 @@ class Early:
 
     def _answered(self, candidate: Decided, sure: bool) -> Decided:
         """The answer of the rule."""
-        if candidate.label is not None and not sure and not self._rule.fixed:
+        if candidate.label is not None and not sure and not is_fixed(self._rule):
             candidate = candidate.flagged(unsure=True)
         stopped_by = "confidence" if sure else "window"
         answer = replace(candidate, error=self._error, stopped_by=stopped_by)
@@ -163,7 +168,7 @@ class Product(Early):
             sure = sure and answer.stopped_by == "confidence"
         index = product_label(factors, indices)
         if index is None or candidate.label is None:
-            return self._answered(candidate.withheld(), sure)
+            return self._answered(withheld(candidate), sure)
         label = self._task.labels[index]
         decision = _decision(candidate)._replace(label=label)
         confidence = round(confidence, 6)
@@ -193,14 +198,15 @@ def stopping_rules(model: Model, error: float) -> dict[str, StoppingRule | None]
         InputError: the rate is outside (0, 1), or is certified for no task; the message
             names the errors that are.
     """
-    check_rate(error, "the error rate")
+    if not 0.0 < error < 1.0:
+        raise InputError(f"the error rate must be above 0 and below 1, not {error:g}")
     if not model.info.decision_points_s:
         raise InputError(
             f"{model.path}: the model has no calibration, so no error rate can be "
             "held; export it with --decision-points"
         )
     rules = {
-        task: stopping.rule(error) for task, stopping in model.info.stopping.items()
+        task: fastest(stopping, error) for task, stopping in model.info.stopping.items()
     }
     if not any(rules.values()):
         reasons = (
@@ -211,6 +217,12 @@ def stopping_rules(model: Model, error: float) -> dict[str, StoppingRule | None]
             f"{'; '.join(reasons)}"
         )
     return rules
+
+
+def fastest(stopping: Stopping, error: float) -> StoppingRule | None:
+    """The fastest rule that is certified for an error rate; or None."""
+    certified = [rule for rule in stopping.rules if rule.error <= error]
+    return certified[-1] if certified else None
 
 
 def log_rules(model: Model, error: float) -> None:
@@ -226,7 +238,7 @@ def log_rules(model: Model, error: float) -> None:
                 f"cannot be certified: {refusal(model.info.stopping[task], error)}"
             )
             continue
-        if rule.fixed:
+        if is_fixed(rule):
             time = f"always after {model.decision_points_s[rule.last]:g} s"
         else:
             time = f"when sure, in training after {rule.mean_s:.2f} s on average"

@@ -96,15 +96,11 @@ class Decided:
         flags = in_order({flag for flag, holds in held.items() if holds})
         return replace(self, flags=flags)
 
-    def withheld(self) -> Self:
-        """The decision without a label, flagged as `unknown`."""
-        return replace(self, label=None, confidence=0.0).flagged(unknown=True)
-
     def to_dict(self) -> dict[str, Any]:
         """The event as a JSON object."""
         line = {**_line("decision", self), "window_s": self.window_s}
         if self.contact is not None:
-            line["place"] = None if self.position is None else list(self.position)
+            line["place"] = self.position and list(self.position)
         for key in ("task", "label", "confidence", "latency_ms"):
             line[key] = getattr(self, key)
         for key in ("strongest", "error", "stopped_by", "unusual", "model"):

@@ -106,7 +106,6 @@ def _calibration(fitted: Fitted) -> dict[str, Any]:
         "decision_points_s": tuple(sequential.decision_points_s),
         "stopping": sequential.stopping_,
         "novelty": sequential.novelty_,
-        "remoteness": sequential.remoteness_,
         "usual": usual_ranges(fitted.dataset, fitted.window_s, fitted.samples),
     }
 

@@ -255,29 +255,38 @@ def _doubt(
     columns = build.stored(
         [-2.0 * p.rows.T for p in points], np.int16, "columns of novelty"
     )
-    lengths = build.by_decision_point(
-        [(p.rows**2).sum(axis=1) for p in points], "lengths of novelty"
-    )
-    squares = build.node("Gemm", y, columns, lengths)
-    root = _nearest(build, build.node("Add", squares, build.squared_length(y)))
-    product = build.node("Mul", build.node("Sqrt", outside), root)
+    squares = _apart(build, "novelty", y, y, columns, [p.rows for p in points])
+    product = build.node("Mul", build.node("Sqrt", outside), _nearest(build, squares))
     units = build.by_decision_point([p.unit for p in points])
     score = build.node("Mul", product, units)
     build.node("Squeeze", score, [1], output=names["novelty"])
     weights = build.by_decision_point([p.weights for p in points])
     weighted = build.node("Mul", y, weights)
-    # The rows' weights are multiplied with those of y, so that the rows are stored
-    # once.
-    twice = build.node("Mul", weighted, weights)
-    lengths = build.by_decision_point(
-        [((p.rows * p.weights) ** 2).sum(axis=1) for p in points],
-        "lengths of remoteness",
-    )
-    squares = build.node("Gemm", twice, columns, lengths)
-    squares = build.node("Add", squares, build.squared_length(weighted))
+    # The rows are stored once: their weights stand beside those of y.
+    factor = build.node("Mul", weighted, weights)
+    rows = [p.rows * p.weights for p in points]
+    squares = _apart(build, "remoteness", weighted, factor, columns, rows)
     nearness = build.by_decision_point_small([p.nearness for p in points])
     root = _nearest(build, build.node("Mul", squares, nearness))
     build.node("Squeeze", root, [1], output=names["remoteness"])
+
+
+def _apart(
+    build: Builder,
+    name: str,
+    y: str,
+    factor: str,
+    columns: str,
+    rows: Sequence[Floats],
+) -> str:
+    """Name of the squared distances (n, rows) of points y (n, c) to the rows of each
+    decision point, whose products with y are those of `factor` (n, c) with the
+    columns."""
+    lengths = build.by_decision_point(
+        [(r**2).sum(axis=1) for r in rows], f"lengths of {name}"
+    )
+    squares = build.node("Gemm", factor, columns, lengths)
+    return build.node("Add", squares, build.squared_length(y))
 
 
 def _nearest(build: Builder, squares: str) -> str:

@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING
 
 from edge.arrays import Floats
 from edge.elementary import log, logistic
-from edge.errors import InputError
 from edge.touch.features import feature_vector, widths
 from edge.touch.layout import SkinLayout, for_device
 from edge.touch.still import WatchfulTracker
@@ -24,21 +23,6 @@ if TYPE_CHECKING:
 
 METADATA_KEY = "edge-classify"
 FORMAT = 8
-UNKNOWN = "unknown"
-"""The flag of a contact with a thing that was never met."""
-TEST_SHARE = 0.5
-"""Part of the risk that the tests on calibration trials take. The rest covers the
-exported model, which errs more or less often than the folds' models do on average."""
-
-
-def check_rate(value: float, name: str) -> None:
-    """Refuse a rate outside (0, 1).
-
-    Raises:
-        InputError: the sentence begins with `name`.
-    """
-    if not 0.0 < value < 1.0:
-        raise InputError(f"{name} must be above 0 and below 1, not {value:g}")
 
 
 @dataclass(frozen=True)
@@ -94,31 +78,27 @@ class Novelty:
 
 @dataclass(frozen=True)
 class Remoteness:
-    """When the thing is unknown: far from all in training by what tells things apart.
+    """When a thing is unknown: far from all in training by what tells things apart.
 
     Attributes:
-        task: that names things. It names none that is unknown.
-        typical, limits: as those of `Novelty`.
-        slopes, middles: (decision points,) a thing is known with the probability
-            logistic(slope * (middle - log(score / typical))).
-        worth: shares of left-out things, and `known`, see `train.model.never_met`;
-            empty where none could be left out.
+        limits: (decision points,) scores that few things in training exceed.
+        middles: (decision points,) scores at which a thing is as likely known as not.
+        slopes: (decision points,) by which the odds fall with the score's logarithm.
+        worth: shares of things that were left out, see `train.model.never_met`; empty
+            where none could be.
     """
 
-    task: str
-    typical: tuple[float, ...]
     limits: tuple[float, ...]
-    slopes: tuple[float, ...]
     middles: tuple[float, ...]
+    slopes: tuple[float, ...]
     worth: Mapping[str, float] = field(default_factory=dict)
 
     def known(self, decision_point: int, score: float) -> float:
         """Probability, 0 to 1, that the thing is one of those in training."""
-        typical = self.typical[decision_point]
-        if not score > 0.0 < typical:
+        if score <= 0.0:
             return 1.0
-        nearer = self.middles[decision_point] - log(score / typical)
-        return logistic(self.slopes[decision_point] * nearer)
+        log_odds = log(self.middles[decision_point] / score)
+        return logistic(self.slopes[decision_point] * log_odds)
 
 
 def margin(distances: Sequence[float], label: int) -> float:
@@ -159,11 +139,6 @@ class StoppingRule:
     confidence: float
     last: int
 
-    @property
-    def fixed(self) -> bool:
-        """Whether the rule waits for a fixed window."""
-        return self.confidence > 1.0
-
 
 @dataclass(frozen=True)
 class Stopping:
@@ -179,6 +154,7 @@ class Stopping:
         trials: number of trials that certify the rules.
         wrong: number of these trials that are decided wrongly at the full window.
         risk: probability that a rule errs more often than its certificate says.
+        remoteness: of the task that names things, and none that is unknown; else None.
     """
 
     slopes: tuple[float, ...]
@@ -191,11 +167,7 @@ class Stopping:
     trials: int
     wrong: int
     risk: float
-
-    @property
-    def smallest_error(self) -> float:
-        """The smallest error rate that is certified."""
-        return self.rules[0].error
+    remoteness: Remoteness | None = None
 
     def confidence(
         self,
@@ -203,6 +175,7 @@ class Stopping:
         distances: Sequence[float],
         label: int,
         excess: float,
+        remoteness: float = 0.0,
     ) -> float:
         """Probability, 0 to 1, that a label is right.
 
@@ -211,15 +184,14 @@ class Stopping:
             distances: (labels,) of `edge.model.Decision.label_distances`.
             label: its index.
             excess: the contact's `Novelty.excess`.
+            remoteness: of the contact.
         """
         log_odds = self.slopes[decision_point] * margin(distances, label)
         log_odds += self.intercepts[decision_point]
-        return logistic(log_odds - self.doubts[decision_point] * excess)
-
-    def rule(self, error: float) -> StoppingRule | None:
-        """The fastest rule that is certified for an error rate; or None."""
-        certified = [rule for rule in self.rules if rule.error <= error]
-        return certified[-1] if certified else None
+        likely = logistic(log_odds - self.doubts[decision_point] * excess)
+        if self.remoteness is None:
+            return likely
+        return likely * self.remoteness.known(decision_point, remoteness)
 
 
 @dataclass(frozen=True)
@@ -248,8 +220,6 @@ class ModelInfo:
     """The stopping rules of each task; empty without decision points."""
     novelty: Novelty | None = None
     """The limits of novelty; None without decision points."""
-    remoteness: Remoteness | None = None
-    """The limits of remoteness; None without decision points."""
     joints: int = 0
     """Number of joint angles in a frame, if a feature is made of them; else 0."""
     kernels: Mapping[str, KernelTable] = field(default_factory=dict)

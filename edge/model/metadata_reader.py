@@ -63,13 +63,14 @@ def _read(meta: ConfigTable) -> ModelInfo:
         chain = Chain.from_dict(arm, where=f"{meta.where}: arm")
     stopping = {}
     novelty = None
-    remoteness = None
     if points:
         rules = meta.table("stopping")
+        count = len(points)
         for task in rules.raw:
-            stopping[task] = read_stopping(rules.table(task), len(points))
-        novelty = read_novelty(meta.table("novelty"), len(points))
-        remoteness = read_remoteness(meta.table("remoteness"), len(points))
+            stopping[task] = read_stopping(rules.table(task), count)
+        table = meta.table("novelty")
+        typical = table.numbers("typical", count, low=0.0)
+        novelty = Novelty(typical, table.numbers("limits", count, low=0.0))
     kernels = {}
     if not KERNELS.keys().isdisjoint(names):
         from edge.touch.kernels import read_tables  # few models have any
@@ -91,7 +92,6 @@ def _read(meta: ConfigTable) -> ModelInfo:
         decision_points_s=points,
         stopping=stopping,
         novelty=novelty,
-        remoteness=remoteness,
         joints=meta.whole("joints", 0, allowed=range(0, 1001)),
         kernels=kernels,
         name=meta.text("name", "", empty=True),
@@ -134,6 +134,9 @@ def read_stopping(table: ConfigTable, points: int) -> Stopping:
         InputError: the table is damaged.
     """
     trials = table.whole("trials", allowed=range(1, 1 << 31))
+    remoteness = None
+    if table.has("remoteness"):
+        remoteness = read_remoteness(table.table("remoteness"), points)
     return Stopping(
         slopes=table.numbers("slopes", points, low=0.0, open_low=True),
         intercepts=table.numbers("intercepts", points),
@@ -153,34 +156,21 @@ def read_stopping(table: ConfigTable, points: int) -> Stopping:
         trials=trials,
         wrong=table.whole("wrong", allowed=range(trials + 1)),
         risk=table.number("risk", low=0.0, high=1.0, open_low=True),
-    )
-
-
-def read_novelty(table: ConfigTable, points: int) -> Novelty:
-    """The limits of novelty, of a model with this number of decision points.
-
-    Raises:
-        InputError: the table is damaged.
-    """
-    return Novelty(
-        typical=table.numbers("typical", points, low=0.0),
-        limits=table.numbers("limits", points, low=0.0),
+        remoteness=remoteness,
     )
 
 
 def read_remoteness(table: ConfigTable, points: int) -> Remoteness:
-    """The limits of remoteness, of a model with this number of decision points.
+    """The doubt about names, of a model with this number of decision points.
 
     Raises:
         InputError: the table is damaged.
     """
     worth = table.table("worth")
     return Remoteness(
-        task=table.text("task"),
-        typical=table.numbers("typical", points, low=0.0),
         limits=table.numbers("limits", points, low=0.0),
+        middles=table.numbers("middles", points, low=1e-9),
         slopes=table.numbers("slopes", points, low=0.0),
-        middles=table.numbers("middles", points),
         worth={name: worth.number(name, low=0.0, high=1.0) for name in worth.raw},
     )
 
@@ -247,7 +237,5 @@ def _points_fit(info: ModelInfo) -> bool:
     """Whether decision points rise to the window, and each task has its rules."""
     points = info.decision_points_s
     rising = sorted({0.0, *points}) == [0.0, *points]
-    if not rising or points[-1] != info.window_s:
-        return False
-    named = info.remoteness is not None and info.remoteness.task in info.tasks
-    return named and info.stopping.keys() == info.tasks.keys()
+    ends = points[-1] == info.window_s
+    return rising and ends and info.stopping.keys() == info.tasks.keys()

@@ -278,13 +278,13 @@ class Model:
         remoteness = float(answers.get("remoteness", 0.0))
         confidence = None
         if self.info.novelty is not None:
-            excess = self.info.novelty.excess(point, novelty)
             confidence = self.info.stopping[task].confidence(
-                point, distances.tolist(), label, excess
+                point,
+                distances.tolist(),
+                label,
+                self.info.novelty.excess(point, novelty),
+                remoteness,
             )
-        names = self.info.remoteness
-        if names is not None and names.task == task and confidence is not None:
-            confidence *= names.known(point, remoteness)
         return Decision(
             label=self.info.tasks[task].labels[label],
             confidence=confidence,
@@ -314,19 +314,18 @@ class Model:
             return OutOfRange(
                 "the features are too large to be scaled; check the skin's units"
             )
-        feature = np.repeat(self.info.features, self.info.widths)[finite.argmin()]
-        return OutOfRange(
-            f"value {finite.argmin()} of the features, of {feature}, is not finite"
-        )
+        place = finite.argmin()
+        feature = np.repeat(self.info.features, self.info.widths)[place]
+        return OutOfRange(f"value {place} of the features, of {feature}, is not finite")
 
 
 def _outputs(info: ModelInfo) -> dict[str, tuple[str, list[int]]]:
     """{output: its type, and its shape for one vector} of a graph with this
     metadata."""
-    outputs: dict[str, tuple[str, list[int]]] = {"out_of_range": ("tensor(double)", [])}
+    scores = ["out_of_range"]
     if info.decision_points_s:
-        for score in ("novelty", "remoteness"):
-            outputs[score] = "tensor(double)", []
+        scores += ["novelty", "remoteness"]
+    outputs = dict.fromkeys(scores, ("tensor(double)", list[int]()))
     for task, entry in info.tasks.items():
         outputs |= {
             f"{task}_label": ("tensor(int64)", []),

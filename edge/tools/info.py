@@ -7,15 +7,20 @@ compares two on recordings.
 
 import argparse
 import json
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from typing import Any
 
 from edge.commands.output import Output, counted
 from edge.commands.texts import wrapped
-from edge.model.info import ModelInfo
+from edge.model.info import ModelInfo, Stopping
 from edge.model.metadata import to_json
 from edge.model.model import Model
 from edge.model.onnx_file import DIGITS
+
+UNMEASURED = (
+    "What it makes of each {} that it has not met is not known: too few were trained for "
+    "any to be left out."
+)
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
@@ -65,28 +70,26 @@ def description(info: ModelInfo, about: dict[str, Any]) -> str:
     if info.decision_points_s:
         points = ", ".join(f"{point:g}" for point in info.decision_points_s)
         lines.append(f"With --error, it may decide at {points} s.")
-    if info.remoteness is not None:
-        lines += wrapped(worth_text(info.remoteness.task, info.remoteness.worth))
+    for sentence in doubt(info.stopping):
+        lines += wrapped(sentence)
     for sentence in _origin(info):
         lines += wrapped(sentence)
     return "\n".join(lines)
 
 
-def worth_text(task: str, worth: Mapping[str, float]) -> str:
-    """What the doubt about a task's names is worth, in words; see
-    `edge.model.info.Remoteness`."""
-    if not worth:
-        return (
-            f"How the {task} of things that it has not met is answered is not known: "
-            "too few were trained for any to be left out."
-        )
-    unknown, unsure, sure, known = (
-        f"{worth[name]:.0%}" for name in ("unknown", "unsure", "sure", "known")
-    )
+def doubt(stopping: Mapping[str, Stopping]) -> Iterator[str]:
+    """A sentence on what a calibrated model's doubt about names is worth."""
+    for task, of_task in stopping.items():
+        if of_task.remoteness is not None:
+            worth = of_task.remoteness.worth
+            yield _worth(task, **worth) if worth else UNMEASURED.format(task)
+
+
+def _worth(task: str, unknown: float, unsure: float, sure: float, known: float) -> str:
     return (
-        f"Of touches of each {task} that it has not met, {unknown} are called unknown, "
-        f"{unsure} are named with a confidence below 50 %, {sure} with more than 90 %; "
-        f"of those that it knows {known} are called unknown."
+        f"Of touches of each {task} that it has not met, {unknown:.0%} are called "
+        f"unknown, {unsure:.0%} are named with a confidence below 50 %, {sure:.0%} with "
+        f"more than 90 %; of those that it knows {known:.0%} are called unknown."
     )
 
 

@@ -12,7 +12,7 @@ from onnxruntime import GraphOptimizationLevel
 
 import train
 from edge.classifier import Classifier
-from edge.early import stopping_rules
+from edge.early import fastest, is_fixed, stopping_rules
 from edge.errors import InputError, OutOfRange
 from edge.events import Decided
 from edge.model.model import Model
@@ -51,7 +51,7 @@ def early(folder):
 @pytest.fixture
 def error(early):
     """The smallest error that is certified for category."""
-    return early.info.stopping["category"].smallest_error
+    return early.info.stopping["category"].rules[0].error
 
 
 def decided(model, recording, error):
@@ -181,7 +181,7 @@ def test_the_board_stops_where_the_rule_does(early, make_touch, error):
         touch = make_touch(kind="soft", seed=seed)
         decision = decided(early, touch, error)["category"].to_dict()
         assert decision["window_s"] in early.decision_points_s[: rule.last + 1]
-        assert decision["stopped_by"] == ("window" if rule.fixed else "confidence")
+        assert decision["stopped_by"] == ("window" if is_fixed(rule) else "confidence")
         assert decision["error"] == error
         assert 0.0 <= decision["confidence"] <= 1.0
 
@@ -249,7 +249,7 @@ def hasty(early, monkeypatch):
         rule = replace(stopping.rules[0], confidence=0.0)
         hurried = replace(stopping, rules=(rule,))
         monkeypatch.setitem(early.info.stopping, task, hurried)
-        smallest.append(hurried.smallest_error)
+        smallest.append(rule.error)
     return early, max(smallest)
 
 
@@ -282,8 +282,10 @@ def test_an_unknown_thing_has_no_name_but_a_kind_at_once(
     hasty, make_touch, monkeypatch, early_ones
 ):
     model, error = hasty
-    nowhere = replace(model.info.remoteness, limits=(0.0, 0.0, 0.0))
-    monkeypatch.setattr(model, "info", replace(model.info, remoteness=nowhere))
+    stopping = model.info.stopping["object"]
+    nowhere = replace(stopping.remoteness, limits=(0.0, 0.0, 0.0))
+    unmet = replace(stopping, remoteness=nowhere)
+    monkeypatch.setitem(model.info.stopping, "object", unmet)
     touch = make_touch(kind="hard", seed=50)
     events = decided(model, touch, error if early_ones else None)
     assert events["object"].label is None
@@ -370,9 +372,9 @@ def test_the_board_decides_as_the_trials_that_certified_its_rules_were(
         for task in model.info.tasks
     }
     _, _, courses = fitted.sequential.judged(np.array(vectors), truth)
-    error = model.info.stopping["category"].smallest_error
+    error = model.info.stopping["category"].rules[0].error
     for task, course in courses.items():
-        at, wrong = course.under(model.info.stopping[task].rule(error))
+        at, wrong = course.under(fastest(model.info.stopping[task], error))
         for i, recording in enumerate(recordings):
             event = decided(model, recording, error)[task]
             assert event.window_s == model.decision_points_s[at[i]]

@@ -62,7 +62,6 @@ def describe(fitted, info=None, samples=40):
         decision_points_s=tuple(getattr(fitted, "decision_points_s", ())),
         stopping=getattr(fitted, "stopping_", {}),
         novelty=getattr(fitted, "novelty_", None),
-        remoteness=getattr(fitted, "remoteness_", None),
     )
 
 

@@ -285,8 +285,8 @@ def confidence_error(kind, point, factor, seed):
                 ]
                 log_odds = sum(terms)
                 true = 1 / (1 + mpmath.exp(-log_odds))
-                if task == info.remoteness.task:
-                    true *= info.remoteness.known(point, decision.remoteness)
+                if rule.remoteness is not None:
+                    true *= rule.remoteness.known(point, decision.remoteness)
                 # An ulp of each term moves the probability by p (1 - p) of it.
                 resolved = 1 + true * (1 - true) * sum(map(abs, terms))
                 error = abs(mpf(decision.confidence) - true) / resolved

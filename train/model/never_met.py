@@ -27,9 +27,12 @@ FEWEST_THINGS = 5
 """Where there are fewer, what remains of a fold says little of the model."""
 MOST_FOLDS = 10
 USUAL_SLOPE = 4.0
-USUAL_MIDDLE = 0.8
-"""The curve where nothing can be left out: about that of simulated and of real
-things."""
+USUAL_MIDDLE = 2.2
+"""The curve where nothing can be left out, with its middle over the typical score: about
+that of simulated and of real things."""
+LEAST_SLOPE = 0.5
+"""So that the middle is no power out of reach."""
+TINY = 1e-300
 PULL = 10.0
 """Inverse of the prior's weight, as scikit-learn's `C`."""
 SURE = 0.9
@@ -44,32 +47,28 @@ def thing_folds(labels: Strings) -> Integers | None:
     return np.where(labels == "", -1, group_folds(labels, MOST_FOLDS))
 
 
-def remoteness_of(task: str, known: Floats, left_out: Floats | None) -> Remoteness:
+def remoteness_of(known: Floats, left_out: Floats | None) -> Remoteness:
     """The limits and the curves of remoteness.
 
     Args:
-        task: that names things.
         known: (decision points, n) remoteness of contacts held out by themselves.
         left_out: (decision points, m) of those with things that were left out; None
             where none could be.
     """
     typical, limits = limits_of(known, UNKNOWN_RATE)
     if left_out is None:
-        slopes = (USUAL_SLOPE,) * len(typical)
-        middles = (USUAL_MIDDLE,) * len(typical)
-    else:
-        curves = map(_curve, known, left_out, typical)
-        slopes, middles = zip(*curves, strict=True)
-    return Remoteness(task, typical, limits, slopes, middles)
+        middles = tuple(USUAL_MIDDLE * score for score in typical)
+        return Remoteness(limits, middles, (USUAL_SLOPE,) * len(middles))
+    middles, slopes = zip(*map(_curve, known, left_out), strict=True)
+    return Remoteness(limits, middles, slopes)
 
 
 def known_of(remoteness: Remoteness, scores: Floats) -> Floats:
     """(decision points, n) probabilities that things are known, as the board has them
     (`edge.model.info.Remoteness.known`), from their remoteness."""
-    columns = remoteness.typical, remoteness.slopes, remoteness.middles
-    typical, slopes, middles = (np.array(column)[:, None] for column in columns)
-    logs = np.log(np.maximum(scores, 1e-300) / np.maximum(typical, 1e-300))
-    return np.asarray(expit(slopes * (middles - logs)))
+    middles = np.array(remoteness.middles)[:, None]
+    slopes = np.array(remoteness.slopes)[:, None]
+    return np.asarray(expit(slopes * np.log(middles / np.maximum(scores, TINY))))
 
 
 def is_unknown(remoteness: Remoteness, scores: Floats) -> Booleans:
@@ -77,17 +76,16 @@ def is_unknown(remoteness: Remoteness, scores: Floats) -> Booleans:
     return np.asarray(scores > np.array(remoteness.limits)[:, None])
 
 
-def _curve(known: Floats, left_out: Floats, typical: float) -> tuple[float, float]:
-    """Slope and middle of a decision point, by the remoteness of contacts (n,) and
+def _curve(known: Floats, left_out: Floats) -> tuple[float, float]:
+    """Middle and slope of a decision point, by the remoteness of contacts (n,) and
     (m,)."""
-    scores = np.concatenate([known, left_out])
-    logs = np.log(np.maximum(scores, 1e-300) / max(typical, 1e-300))
-    is_known = np.arange(len(scores)) < len(known)
+    logs = np.log(np.maximum(np.concatenate([known, left_out]), TINY))
+    is_known = np.arange(len(logs)) < len(known)
     ratio = SHARE / (1.0 - SHARE) * len(known) / len(left_out)
     weights = np.where(is_known, 1.0, ratio)
     fitted = LogisticRegression(C=PULL).fit(-logs[:, None], is_known, weights)
-    slope = max(float(fitted.coef_[0, 0]), 1e-3)
-    return slope, float(fitted.intercept_[0]) / slope
+    slope = max(float(fitted.coef_[0, 0]), LEAST_SLOPE)
+    return float(np.exp(fitted.intercept_[0] / slope)), slope
 
 
 def worth_of(

@@ -35,7 +35,9 @@ from scipy.special import expit
 from scipy.stats import beta
 
 from edge.arrays import Booleans, Floats, Integers
-from edge.model.info import TEST_SHARE, StoppingRule
+from edge.early import is_fixed
+from edge.model.info import StoppingRule
+from edge.model.refusal import TEST_SHARE
 
 RISK = 0.1
 """Probability that a certificate is wrong."""
@@ -134,7 +136,7 @@ def certify(course: Course, seconds: Floats) -> list[StoppingRule]:
             passed.append(tested(rule, full_level / len(families), before))
             before = passed[-1].error
     # Among equal rules the fixed window comes first, as it needs no confidence.
-    passed.sort(key=lambda rule: (rule.error, rule.mean_s, not rule.fixed))
+    passed.sort(key=lambda rule: (rule.error, rule.mean_s, not is_fixed(rule)))
     best: list[StoppingRule] = []
     for rule in passed:
         if rule.error < 1.0 and (not best or rule.mean_s < best[-1].mean_s - 1e-9):
@@ -197,7 +199,7 @@ class Agreeing:
             mean_s = float(seconds[at].mean())
             if not rules or mean_s <= rules[-1].mean_s + 1e-9:
                 followed[factor] = replace(rule, mean_s=mean_s)
-        if not rule.fixed and len(followed) < len(self.factors):
+        if not is_fixed(rule) and len(followed) < len(self.factors):
             if self.product:
                 return
             # The full window errs no more often than any rule that is tested after it.

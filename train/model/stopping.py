@@ -179,7 +179,10 @@ class SequentialClassifier:
         self.stopping_ = self._with_curves(
             self._certified(chosen_without), chosen_by_all
         )
+        of_name = self.stopping_[self._name]
         self.remoteness_ = replace(self._bare, worth=self._worth(of_model))
+        named = replace(of_name, remoteness=self.remoteness_)
+        self.stopping_ = {**self.stopping_, self._name: named}
         return self
 
     @property
@@ -243,7 +246,7 @@ class SequentialClassifier:
             of_vectors = vectors.X, labels, self._things, vectors.columns
             self._left_out = held_out_scores(*of_vectors, self.jobs)
             left_out = self._left_out.part(self._things >= 0).remoteness
-        self._bare = remoteness_of(self._name, tested.remoteness, left_out)
+        self._bare = remoteness_of(tested.remoteness, left_out)
         self._known = known_of(self._bare, scores.remoteness)
         self.unusual_ = is_unusual(self.novelty_, scores.novelty)
         self.unknown_ = is_unknown(self._bare, scores.remoteness)

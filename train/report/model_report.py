@@ -14,6 +14,7 @@ from sklearn.metrics import precision_recall_fscore_support
 from edge.arrays import Integers
 from edge.model.model import Model
 from edge.tools.explanation import Explanation, Space, explain
+from edge.tools.info import doubt
 from train.choose.evaluate import Result
 from train.data.folds import finest, stratified_folds
 from train.data.labels import NO_CONTACT
@@ -33,7 +34,7 @@ from train.report import page
 from train.report.figures import confusion, lines, picture
 from train.report.score import interval, percent
 from train.report.section import Figure, Row, Section, Table, counted
-from train.report.summary import Prices, accuracy, candidates, doubt, names, warnings
+from train.report.summary import Prices, accuracy, candidates, names, warnings
 from train.report.work import Workers
 
 QUARTERS = 4
@@ -225,7 +226,7 @@ def write(
         "fifths of the trials, because that model differs from those of the folds. "
         "Where entire groups are held out they count groups, whose trials are right or "
         "wrong together.",
-        *doubt(fitted),
+        *doubt(model.info.stopping),
         *(
             line[0].upper() + line[1:] + "."
             for line in (*fitted.notes, *warnings(fitted))

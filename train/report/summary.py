@@ -10,7 +10,7 @@ from sklearn.neighbors import NearestNeighbors
 
 from edge.arrays import Floats, Integers
 from edge.errors import printable
-from edge.tools.info import worth_text
+from edge.tools.info import doubt
 from edge.touch import measures
 from train.choose.settings import Chosen
 from train.data import outliers
@@ -55,15 +55,9 @@ def summary(fitted: Fitted, prices: Prices) -> str:
     if any(map(moves, map(measures.feature, fitted.dataset.names))):
         frame = "along the skin" if fitted.dataset.chain is None else "in the world"
         lines.append(f"contact motion is measured {frame}")
-    return "\n".join([*lines, *doubt(fitted), *warnings(fitted), *fitted.notes])
-
-
-def doubt(fitted: Fitted) -> Iterator[str]:
-    """A sentence on what is made of things that were never met, of a calibrated
-    model."""
     if fitted.sequential is not None:
-        remoteness = fitted.sequential.remoteness_
-        yield worth_text(remoteness.task, remoteness.worth)
+        lines += doubt(fitted.sequential.stopping_)
+    return "\n".join([*lines, *fitted.notes, *warnings(fitted)])
 
 
 def _aligned(table: Table) -> list[str]:

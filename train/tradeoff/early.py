@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from edge.arrays import Booleans, Floats, Integers
+from edge.early import fastest
 from edge.model.info import Stopping
 from edge.statistics import Z
 from train.choose.evaluate import VARIANCE, Promise, Result
@@ -244,7 +245,7 @@ def _certified(
     seconds = np.array(decision_points_s)
     waiting, _ = candidates(len(seconds))
     _, late = course.under(waiting)
-    rules = {stopping.rule(error): error for error in reversed(ERRORS)}
+    rules = {fastest(stopping, error): error for error in reversed(ERRORS)}
     certified = []
     for rule, error in reversed(rules.items()):
         if rule is None:

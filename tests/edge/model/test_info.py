@@ -8,19 +8,16 @@ import numpy as np
 import pytest
 
 from edge.config import ConfigTable
-from edge.early import is_sure
+from edge.early import fastest, is_fixed, is_sure, stopping_rules
 from edge.errors import InputError
 from edge.model.info import (
-    TEST_SHARE,
-    Novelty,
     Remoteness,
     Stopping,
     StoppingRule,
-    check_rate,
     margin,
 )
-from edge.model.metadata_reader import read_novelty, read_remoteness, read_stopping
-from edge.model.refusal import refusal
+from edge.model.metadata_reader import read_remoteness, read_stopping
+from edge.model.refusal import TEST_SHARE, refusal
 from edge.model.unusual import unusual
 
 
@@ -55,8 +52,8 @@ def stopping(**changes):
 
 
 def test_the_fastest_rule_that_is_certified_is_taken():
-    assert stopping().rule(0.05) is None
-    assert [stopping().rule(error).mean_s for error in (0.1, 0.2, 0.9)] == [
+    assert fastest(stopping(), 0.05) is None
+    assert [fastest(stopping(), error).mean_s for error in (0.1, 0.2, 0.9)] == [
         1.2,
         0.8,
         0.4,
@@ -115,11 +112,9 @@ def test_where_the_full_window_errs_more_often_trials_do_not_help():
 
 
 REMOTENESS = Remoteness(
-    "t",
-    typical=(1.0, 2.0),
     limits=(3.0, 4.0),
+    middles=(math.e, 2.0),
     slopes=(1.0, 5.0),
-    middles=(1.0, 0.0),
     worth={"unknown": 0.46, "sure": 0.09},
 )
 
@@ -130,8 +125,6 @@ def table(stored):
 
 def test_what_is_stored_is_read_again():
     assert read_stopping(table(stopping()), 3) == stopping()
-    novelty = Novelty((1.0, 2.0), (3.0, 4.0))
-    assert read_novelty(table(novelty), 2) == novelty
     assert read_remoteness(table(REMOTENESS), 2) == REMOTENESS
 
 
@@ -156,7 +149,7 @@ def test_what_contradicts_itself_is_no_stopping(changes, says):
     ("changes", "says"),
     [
         ({"limits": (1.0,)}, "limits must be a list of 2 numbers, not"),
-        ({"typical": (1.0, -1.0)}, "typical must be a number of at least 0, not -1.0"),
+        ({"slopes": (1.0, -1.0)}, "slopes must be a number of at least 0, not -1.0"),
         ({"worth": {"sure": 1.5}}, "worth.sure must be a number from 0 to 1, not 1.5"),
     ],
 )
@@ -171,12 +164,6 @@ def test_damaged_limits_are_refused(changes, says):
 )
 def test_the_farther_a_thing_the_less_likely_it_is_known(point, score, known):
     assert REMOTENESS.known(point, score) == pytest.approx(known)
-
-
-@pytest.mark.parametrize("value", [0.0, 1.0, math.nan])
-def test_a_rate_lies_inside_0_to_1(value):
-    with pytest.raises(InputError, match="must be above 0 and below 1"):
-        check_rate(value, "the error rate")
 
 
 @pytest.mark.parametrize(
@@ -199,4 +186,10 @@ def test_what_is_farthest_from_its_usual_range_is_said(means, phrase):
 def test_only_a_rule_that_no_confidence_meets_waits_for_a_fixed_window(
     confidence, fixed
 ):
-    assert StoppingRule(0.1, 1.0, confidence, 3).fixed is fixed
+    assert is_fixed(StoppingRule(0.1, 1.0, confidence, 3)) is fixed
+
+
+@pytest.mark.parametrize("error", [0.0, 1.0, math.nan])
+def test_an_error_rate_lies_inside_0_to_1(error):
+    with pytest.raises(InputError, match="must be above 0 and below 1"):
+        stopping_rules(None, error)

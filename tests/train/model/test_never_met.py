@@ -28,7 +28,7 @@ def test_entire_things_are_left_out_where_there_are_enough():
 
 def test_the_probability_is_that_of_a_share_of_unmet_things():
     """By Bayes's rule, of two log-normal distributions of one width."""
-    remoteness = remoteness_of("t", remote(1.0), remote(1.5, seed=1))
+    remoteness = remoteness_of(remote(1.0), remote(1.5, seed=1))
     logs = np.linspace(-0.5, 1.0, 7)
     ratio = (np.log(1.5) * logs - 0.5 * np.log(1.5) ** 2) / 0.2**2
     odds = (1.0 - SHARE) / SHARE * np.exp(-ratio)
@@ -37,7 +37,7 @@ def test_the_probability_is_that_of_a_share_of_unmet_things():
 
 
 def test_training_knows_things_as_the_board_does():
-    remoteness = remoteness_of("t", remote(1.0), remote(1.5, seed=1))
+    remoteness = remoteness_of(remote(1.0), remote(1.5, seed=1))
     new = remote(1.2, n=9, seed=2)
     for point, known in enumerate(known_of(remoteness, new)):
         expected = [remoteness.known(point, score) for score in new[point]]
@@ -45,7 +45,7 @@ def test_training_knows_things_as_the_board_does():
 
 
 def test_where_nothing_can_be_left_out_the_usual_curve_serves():
-    remoteness = remoteness_of("t", remote(1.0), None)
+    remoteness = remoteness_of(remote(1.0), None)
     assert remoteness.worth == {}
     assert remoteness.known(0, 0.9) > 0.9
     assert remoteness.known(0, 5.0) < 0.1

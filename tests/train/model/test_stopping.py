@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 from scipy.special import logit
 
+from edge.early import fastest
 from edge.errors import InputError
 from train.data.folds import stratified_folds
 from train.model.held_out import answers
@@ -46,7 +47,7 @@ def touches(n, seed=0):
 def test_what_is_plain_from_the_second_decision_point_on_is_decided_there():
     X, labels = touches(120)
     model = calibrated(of_neighbours(3), X, {"t": labels})
-    assert model.stopping_["t"].rule(0.1).mean_s <= 0.83
+    assert fastest(model.stopping_["t"], 0.1).mean_s <= 0.83
     new, truth = touches(300, seed=1)
     named, _ = answers(model.decision_points_, new)["t"]
     assert (named[1:] == truth).all()
@@ -99,7 +100,8 @@ def test_an_unknown_thing_is_an_error_of_the_task_that_then_names_nothing():
     things = np.char.add(labels, np.where(X[1, :, 1] > 0, "+", "-"))
     choices = {"kind": Choice("none", 12, 1), "thing": Choice("none", 12, 1)}
     model = calibrated(choices, X, {"kind": labels, "thing": things})
-    assert model.remoteness_.task == "thing"
+    assert model.stopping_["thing"].remoteness is not None
+    assert model.stopping_["kind"].remoteness is None
     unknown = model.unknown_[-1]
     right = {task: answers[-1] for task, answers in model.right_.items()}
     assert 0 < (unknown & right["thing"]).sum() < 10
