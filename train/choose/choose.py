@@ -14,6 +14,7 @@ from train.choose.evaluate import (
     AnswerTable,
     Promise,
     Result,
+    RuleOf,
     averaged,
     evaluate,
     fits,
@@ -109,16 +110,20 @@ class Choosing:
         what: str,
         *,
         nested: bool,
-        repeated: bool = True,
-        halve: bool = True,
+        several: bool = False,
     ) -> tuple[AnswerTable, AnswerTable]:
         """The candidates' answers to left-out trials, and to left-out groups where
         there are any, each of the tasks that are chosen by them.
 
-        Without groups, both are the answers to left-out trials.
+        Without groups, both are the answers to left-out trials. A candidate counts by
+        its mean over `several` windows; then none is dropped, and there is one division.
         """
         folds = self._divisions.folds
-        further_folds = self._divisions.further if repeated else ()
+        further_folds = self._divisions.further
+        rules: tuple[RuleOf | None, ...] = (self._rule_of_trials, self._rule_of_groups)
+        if several:
+            further_folds = ()
+            rules = (None, None)
         grouped = [task for task in self._y if self._is_grouped(task)]
         by_trial = for_tasks(candidates, {*self._y}.difference(grouped))
         total = fits(folds, nested)
@@ -138,10 +143,9 @@ class Choosing:
                 jobs=self._jobs,
                 progress=progress.update,
             )
-            rules = self._rule_of_trials if halve else None
-            trials = answers(folds, by_trial, nested=nested, halve=rules)
+            trials = answers(folds, by_trial, nested=nested, halve=rules[0])
             further = [
-                answers(division, by_trial, nested=False, halve=rules)
+                answers(division, by_trial, nested=False, halve=rules[0])
                 for division in further_folds
             ]
             trials = replace(trials, repeated=tuple(further))
@@ -150,8 +154,7 @@ class Choosing:
             carried_over = [c for c in candidates if not c.known]
             grouped_tasks = _grouped_tasks(self._groups, self._y)
             unseen = _unseen(self._groups, for_tasks(carried_over, grouped_tasks))
-            rules = self._rule_of_groups if halve else None
-            groups = answers(self._groups.folds, unseen, nested=nested, halve=rules)
+            groups = answers(self._groups.folds, unseen, nested=nested, halve=rules[1])
         return trials, groups
 
     def _right(self, window_s: float) -> dict[str, Floats]:
@@ -284,9 +287,7 @@ class Choosing:
         dataset = self._dataset.of(features_of(candidates))
         vectors = dataset.vectors(window_s, self._samples, self._y)
         what = f"{window_s:g} s"
-        # A candidate counts by its mean over several windows, so none is dropped.
-        once = {"nested": False, "repeated": False, "halve": False}
-        return self._tables(vectors, candidates, what, **once)
+        return self._tables(vectors, candidates, what, nested=False, several=True)
 
     def _settle(
         self,
