@@ -271,6 +271,8 @@ class Choosing:
             return None
         tables = [self._early_tables(share * window_s) for share in EARLY_SHARES]
         trials, groups = self._protocols(*map(averaged, zip(*tables, strict=True)))
+        # Each decision point has weights of its own, so that prices count.
+        trials = replace(trials, is_few=False)
         folds = self._divisions.folds
         settled = {}
         for task in self._y:
