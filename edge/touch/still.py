@@ -92,9 +92,8 @@ class StillTaxels:
             self.early = []
             return [now]
         beside = active_taxels(frame, self._layout, self.aside)
-        soon = age_s <= EARLY_S
-        if self.touched or (soon and self.early and _grown(active, beside)):
-            early = self.early if soon else []
+        early = self.early if age_s <= EARLY_S else []
+        if self.touched or (early and _grown(active, beside)):
             self.early = []
             return [*early, now]
         if age_s == 0.0 or (self.early and age_s <= self._longest_s):

@@ -110,7 +110,8 @@ class Choosing:
         """The candidates' answers to left-out trials, and to left-out groups where
         there are any, each of the tasks that are chosen by them.
 
-        Without groups, both are the answers to left-out trials.
+        Without groups, both are the answers to left-out trials. A candidate counts by
+        its mean over `several` windows; then none is dropped, and there is one division.
         """
         folds = self._divisions.folds
         further_folds = self._divisions.further

@@ -128,6 +128,25 @@ def test_tasks_that_agree_are_scored_as_they_are_decided_together(agreeing, hits
         assert settings.by_fold == (choices,) * 5
 
 
+def test_a_task_with_groups_is_scored_by_single_trials_too(agreeing):
+    vectors, choices, folds = agreeing
+    mobility = replace(vectors, y={"mobility": vectors.y["mobility"]})
+    right = 0
+    for fold in range(5):
+        others = mobility.part(folds != fold)
+        test = mobility.part(folds == fold)
+        model = ContactClassifier.of({"mobility": choices["mobility"]}, others)
+        labels = model.decide(test.X)["mobility"].labels
+        named = model.tasks_["mobility"].classes[labels]
+        right += (named == test.y["mobility"]).sum()
+    none_right = Promise(0, 60, hits=np.zeros(60, dtype=bool))
+    chosen = {"mobility": Chosen(choices["mobility"], none_right, none_right, "object")}
+    alone = {"mobility": choices["mobility"]}
+    plans = {left_out: (folds, [alone] * 5) for left_out in ("trial", "object")}
+    settings = decided_together(chosen, mobility, plans)["mobility"]
+    assert settings.by_trial.right == right
+
+
 def test_a_category_is_right_where_both_of_its_factors_are(hits):
     of_factors = hits["mobility"] & hits["softness"]
     assert (hits["category"] == of_factors).all()
