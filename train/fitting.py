@@ -214,7 +214,12 @@ def calibrate(
         widths=dataset.widths(options.samples),
         early=settings.early,
     )
-    return classifier.fit(at_points, y, settings.folds, settings.without)
+    groups = {
+        task: chosen.folds
+        for task, chosen in settings.chosen.items()
+        if chosen.left_out != TRIAL
+    }
+    return classifier.fit(at_points, y, settings.folds, settings.without, groups)
 
 
 def _of_unseen(settings: Settings, options: FitOptions) -> list[str]:
