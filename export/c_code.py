@@ -328,7 +328,7 @@ def _tasks(
     rows = []
     for name, task in info.tasks.items():
         stopping = info.stopping.get(name)
-        curves = [(0.0, 0.0, 0.0)]
+        curves: list[tuple[float, ...]] = [(0.0, 0.0, 0.0)]
         whole = curves[0]
         if stopping is not None:
             of_points = stopping.slopes, stopping.intercepts, stopping.doubts

@@ -216,7 +216,8 @@ def calibrate(
         widths=dataset.widths(options.samples),
         early=settings.early,
     )
-    return classifier.fit(at_points, y, settings.folds, settings.without)
+    grouped = [t for t, chosen in settings.chosen.items() if chosen.left_out != TRIAL]
+    return classifier.fit(at_points, y, settings.folds, settings.without, grouped)
 
 
 def _of_unseen(settings: Settings, options: FitOptions) -> list[str]:

@@ -7,7 +7,9 @@ machines, 1999).
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from collections.abc import Callable
+from dataclasses import dataclass, fields, replace
+from typing import Any
 
 import numpy as np
 from scipy.optimize import brentq
@@ -89,6 +91,46 @@ class Curve:
         """That labels with these margins are right, in the shape of the margins."""
         logits = self.slope * margins + self.intercept - self.doubt * excess
         return np.asarray(expit(logits))
+
+
+@dataclass(frozen=True)
+class Evidence:
+    """What answers to left-out trials say of how sure a model may be; arrays of one
+    shape.
+
+    Attributes:
+        margins: of the labels.
+        excess: of the contacts' novelty.
+        right: whether the labels are right.
+        honest: whether those are right whose settings were chosen without the trials.
+        known: probability that the thing is one of those in training, by which that of
+            the curve is multiplied.
+    """
+
+    margins: Floats
+    excess: Floats
+    right: Booleans
+    honest: Booleans
+    known: Floats
+
+    def curve(self) -> Curve:
+        """The curve of the answers, with the mean probability of honest ones."""
+        curve = Curve.of(self.margins, self.excess, self.right)
+        share = float(self.honest.mean())
+        return curve.with_mean(self.margins, self.excess, share, self.known)
+
+    def at(self, point: int) -> Evidence:
+        """The evidence at one decision point."""
+        return self._with(lambda name: getattr(self, name)[point])
+
+    def beside(self, other: Evidence) -> Evidence:
+        """This evidence and another one (n,) together."""
+        return self._with(
+            lambda name: np.concatenate([getattr(self, name), getattr(other, name)])
+        )
+
+    def _with(self, values: Callable[[str], Any]) -> Evidence:
+        return Evidence(**{field.name: values(field.name) for field in fields(self)})
 
 
 def _logistic(

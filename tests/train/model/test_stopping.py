@@ -69,11 +69,32 @@ def test_the_full_window_has_a_curve_of_its_own():
     """Early answers are right by chance, those of the full window always."""
     X, labels = touches(60)
     X[1] = X[0]
-    stopping = calibrated(of_neighbours(3), X, {"t": labels}).stopping_["t"]
+    things = np.char.add(labels, (np.arange(60) % 3).astype(str))
+    choices = {**of_neighbours(3), "thing": Choice("none", 3, 3)}
+    model = calibrated(choices, X, {"t": labels, "thing": things})
+    stopping = model.stopping_["t"]
     assert stopping.slopes[:2] == (stopping.slope,) * 2
     assert stopping.intercepts[:2] == (stopping.intercept,) * 2
     assert stopping.slopes[2] != stopping.slope
     assert stopping.intercepts[2] > stopping.intercept
+
+
+def test_answers_to_groups_that_were_not_met_lower_the_confidence_at_the_full_window():
+    """Where a sixth of the things is left out, its trials are called wrongly."""
+    X, labels = touches(120)
+    things = np.arange(120) % 6
+    X[:, things == 3, 0] = np.where(labels[things == 3] == "a", 0.0, 30.0)
+    X[:, things == 3, 1] += 300.0
+    choices = {**of_neighbours(3), "thing": Choice("none", 3, 3)}
+    y = {"t": labels, "thing": things.astype(str)}
+    calibration = X, y, stratified_folds(labels), [choices] * 10
+    model = SequentialClassifier(choices, SECONDS, ("max_force",))
+    known = model.fit(*calibration).stopping_["t"]
+    with_others = model.fit(*calibration, ["t"]).stopping_["t"]
+    assert model.right_["t"][-1].all()
+    assert with_others.intercepts[:2] == known.intercepts[:2]
+    assert with_others.intercepts[2] < known.intercepts[2]
+    assert with_others.rules == known.rules
 
 
 def test_each_fold_is_answered_by_what_was_chosen_without_it():
