@@ -248,7 +248,9 @@ def measure(model, trials):
         cases[name] = partial(redone, changed, fresh)
     objects = scenes.load(STRANGE, seed=FRESH_SEED).objects
     never_met = replace(scene, objects=objects, trials={**scene.trials, "count": 1})
-    cases["things never met"] = partial(fresh_touches, never_met)
+    cases["things never met, so every name is wrong"] = partial(
+        fresh_touches, never_met
+    )
     rows = []
     usual = {}
     for name, shifted in bar(cases.items(), desc="shifts", total=len(cases)):
