@@ -59,13 +59,6 @@ def test_a_joint_that_rests_longer_than_in_training_is_still(joint, after_s, fla
     assert doubts(series(stopped(joint, after_s))) == flags
 
 
-def test_angles_that_come_late_stand_still_after_the_onset():
-    def late(t):
-        return np.array([0.3 * t, 0.4 * max(t - LEAD / 100 - 0.1, 0.0)])
-
-    assert doubts(series(late), still_s=(0.0, 0.0), speeds=()) == {"still_joints"}
-
-
 def test_the_longest_standstill_is_of_each_joint():
     t = np.arange(6) * 0.1
     angles = np.array([[0, 1], [0, 2], [1, 2], [2, 2], [2, 3], [2, np.nan]])
