@@ -79,7 +79,7 @@ def _read(meta: ConfigTable) -> ModelInfo:
     info = ModelInfo(
         tasks=task_of,
         layout=layout,
-        debounce=tracking.whole("debounce", allowed=range(1, 1001)),
+        debounce=tracking.whole("debounce", allowed=range(1, 101)),
         window_s=meta.number("window_s", low=0.0, high=3600.0, open_low=True),
         samples=meta.whole("samples", allowed=range(2, 10_001)),
         features=names,
@@ -114,7 +114,7 @@ def _task(table: ConfigTable) -> Task:
     task = Task(
         labels,
         k=table.whole("k", allowed=range(1, 1 << 31)),
-        components=table.whole("components", allowed=range(1 << 31)),
+        components=table.whole("components", allowed=range(1, 1 << 31)),
         scaling=table.text("scaling"),
         accuracy=table.number("accuracy", low=0.0, high=1.0),
         projection=table.text("projection"),
@@ -138,10 +138,10 @@ def read_stopping(table: ConfigTable, points: int) -> Stopping:
     if table.has("remoteness"):
         remoteness = read_remoteness(table.table("remoteness"), points)
     return Stopping(
-        slopes=table.numbers("slopes", points, low=0.0, open_low=True),
+        slopes=table.numbers("slopes", points, low=1e-12, high=1e12),
         intercepts=table.numbers("intercepts", points),
         doubts=table.numbers("doubts", points, low=0.0),
-        slope=table.number("slope", low=0.0, open_low=True),
+        slope=table.number("slope", low=1e-12, high=1e12),
         intercept=table.number("intercept"),
         doubt=table.number("doubt", low=0.0),
         rules=tuple(

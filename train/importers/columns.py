@@ -151,7 +151,8 @@ def meaning(table: Table, options: TableOptions) -> Meaning:
         raise InputError(
             f"{table.where}: column {name} is named both as a taxel and as time or joint"
         )
-    left_out = [name for name in rest if name not in taxels]
+    felt = set(taxels)
+    left_out = [name for name in rest if name not in felt]
     unit, source = _unit(table, time, options)
     is_told = any((table.named, table.shape, table.file_names, options.taxels))
     shape = table.shape or shape

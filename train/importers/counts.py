@@ -202,15 +202,7 @@ def rest_of(trials: Sequence[Samples], options: ValueOptions) -> Rest:
     """
     if options.falls and options.signed:
         raise InputError("--falls and --signed exclude each other; give one")
-    for trial in trials:
-        trial.values[trial.values == options.missing] = math.nan
-    _say_alone(trials)
-    missing = sum(int(trial.missing.sum()) for trial in trials)
-    if missing:
-        say(
-            f"missing: {counted(missing, 'value')}, where a taxel is not valid in its "
-            "frame"
-        )
+    _say_missing(trials, options.missing)
     if not (options.falls or options.signed):
         return Rest(scale=options.scale)
     values = _quietest(trials, options)
@@ -222,8 +214,18 @@ def rest_of(trials: Sequence[Samples], options: ValueOptions) -> Rest:
     return Rest(values, scale=scale)
 
 
-def _say_alone(trials: Sequence[Samples]) -> None:
-    """Say which numbers stand alone, as those do that stand for missing values."""
+def _say_missing(trials: Sequence[Samples], code: float | None) -> None:
+    """Take away the values that stand for missing ones, and say how many are missing,
+    and which others stand alone as such values do."""
+    missing = 0
+    for trial in trials:
+        trial.values[trial.values == code] = math.nan
+        missing += int(trial.missing.sum())
+    if missing:
+        say(
+            f"missing: {counted(missing, 'value')}, where a taxel is not valid in its "
+            "frame"
+        )
     values = np.concatenate([trial.values.ravel() for trial in trials])
     for code in CODES:
         others = values[np.isfinite(values) & (values != code)]

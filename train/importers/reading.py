@@ -354,13 +354,14 @@ def _parsed(text: _Text, header: _Header) -> pd.DataFrame:
         # Columns that hold texts in a part of a long table are read anew below.
         warnings.simplefilter("ignore", pd.errors.DtypeWarning)
         table = _cells(text, header, decimal=text.decimal)
+    dtypes = list(table.dtypes)
     altered = []
     for i, name in enumerate(header.names):
-        is_number = pd.api.types.is_numeric_dtype(table[i])
+        if name != "trial" and pd.api.types.is_numeric_dtype(dtypes[i]):
+            continue
         # A word such as `NA` is no string any more, nor is a number beyond measure.
         is_text = pd.api.types.infer_dtype(table[i]) == "string"
-        stands = is_text and not table[i].hasnans
-        if not stands and (name == "trial" or not is_number):
+        if not is_text or table[i].hasnans:
             altered.append(i)
     if altered:
         table[altered] = _texts(text, header, altered)

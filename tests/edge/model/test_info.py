@@ -132,7 +132,7 @@ def test_what_is_stored_is_read_again():
     ("changes", "says"),
     [
         ({"slopes": (1.0, 1.0)}, "slopes must be a list of 3 numbers"),
-        ({"slopes": (1.0, -1.0, 1.0)}, "slopes must be a number above 0, not -1.0"),
+        ({"slopes": (1.0, 1e308, 1.0)}, "slopes must be a number from 1e-12 to 1e"),
         (
             {"rules": (StoppingRule(0.1, 1.0, 0.9, 3),)},
             "rules 0: last must be .* 0 to 2, not 3",

@@ -200,7 +200,11 @@ REFUSED = {
     category(
         components=10**9
     ): "task 'category' has 1000000000 components of 120 features",
-    meta(tracking={"debounce": 0}): "debounce must be a whole number from 1 to 1000",
+    category(components=0): "components must be a whole number from 1 to",
+    meta(tracking={"debounce": 0}): "debounce must be a whole number from 1 to 100",
+    edited(
+        lambda m: m["skin"].update(counts_per_newton=1e-300)
+    ): "counts_per_newton must be a number from 1e-09 to 1e+09, not 1e-300",
     edited(
         lambda m: m.update(usual={name: [2.0, 1.0] for name in m["features"]})
     ): "usual.max_force must be two numbers that rise, not",
