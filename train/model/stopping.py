@@ -53,7 +53,7 @@ from train.model.curves import Curve, Evidence, cross_fitted
 from train.model.held_out import AtPoints, HeldOut, answers, held_out
 from train.model.novelty import FOLDS, NoveltySpace, held_out_scores, limits_of
 from train.model.pipeline import Choices, ContactClassifier
-from train.model.rules import RISK, Agreeing, Course, candidates, certify
+from train.model.rules import RISK, Course, agreeing, candidates, certify
 from train.threads import single_thread
 
 FEWEST = 20
@@ -273,9 +273,7 @@ class SequentialClassifier:
         seconds = np.array(self.decision_points_s)
         rules = {task: certify(course, seconds) for task, course in courses.items()}
         for task, factors in self.products_.items():
-            of_factors = {factor: rules[factor] for factor in factors}
-            agreeing = Agreeing.of(rules[task], of_factors, courses, seconds)
-            rules |= {task: agreeing.product, **agreeing.factors}
+            rules |= agreeing(task, factors, rules, courses, seconds)
         full, _ = candidates(len(seconds))
         certified = {}
         for task, of_task in rules.items():
