@@ -102,17 +102,16 @@ def early_options(
             continue
         *_, grid = (grid for grid in candidate.grids if not grid.tasks)
         for shrinkage in SHRINKAGES:
-            by_task = {}
-            for task, choice in full.items():
-                by_task[task] = Choice(
-                    grid.scaling,
-                    MOST_COMPONENTS,
-                    choice.k,
-                    grid.projection,
-                    shrinkage,
-                    grid.features,
-                    grid.targets,
-                )
+            option = Choice(
+                grid.scaling,
+                MOST_COMPONENTS,
+                1,
+                grid.projection,
+                shrinkage,
+                grid.features,
+                grid.targets,
+            )
+            by_task = {task: replace(option, k=full[task].k) for task in full}
             options.append(by_task)
     return options
 
@@ -143,7 +142,10 @@ def settle_early(
     """
     y = vectors.y
     left_out = stratified_folds(y[finest(y)], FOLDS)
-    fewest = len(left_out) - int(np.bincount(left_out).max())
+    fewest = {}
+    for task, labels in y.items():
+        labelled = np.bincount(left_out[labels != ""])
+        fewest[task] = int(labelled.sum() - labelled.max())
     runs = []
     for option in options:
         at_points = [*[option] * len(SHARES), full]
@@ -167,9 +169,12 @@ def settle_early(
     return Early(window_s, choices, by_fold)
 
 
-def _with_at_most(neighbours: int, choices: Choices) -> dict[str, Choice]:
-    """Settings that so few trials allow."""
-    return {t: replace(c, k=min(c.k, neighbours)) for t, c in choices.items()}
+def _with_at_most(
+    neighbours: Mapping[str, int],
+    choices: Choices,
+) -> dict[str, Choice]:
+    """Settings with at most so many neighbours for each task."""
+    return {t: replace(c, k=min(c.k, neighbours[t])) for t, c in choices.items()}
 
 
 def by_folds(choices: Mapping[str, Sequence[Choice]]) -> list[dict[str, Choice]]:

@@ -7,9 +7,7 @@ machines, 1999).
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass, fields, replace
-from typing import Any
+from dataclasses import astuple, dataclass, replace
 
 import numpy as np
 from scipy.optimize import brentq
@@ -121,16 +119,7 @@ class Evidence:
 
     def at(self, point: int) -> Evidence:
         """The evidence at one decision point."""
-        return self._with(lambda name: getattr(self, name)[point])
-
-    def beside(self, other: Evidence) -> Evidence:
-        """This evidence and another one (n,) together."""
-        return self._with(
-            lambda name: np.concatenate([getattr(self, name), getattr(other, name)])
-        )
-
-    def _with(self, values: Callable[[str], Any]) -> Evidence:
-        return Evidence(**{field.name: values(field.name) for field in fields(self)})
+        return Evidence(*(values[point] for values in astuple(self)))
 
 
 def _logistic(

@@ -15,7 +15,7 @@ a fold's trials come from a logistic regression on the other folds.
 Tasks that agree (`edge.model.agreement`) have one rule: the factors are decided when
 each is sure, their product when both are, and the tests count the product's errors.
 Below the smallest error that is certified for the product, each factor has rules of its
-own. Where these are faster, the product waits for a fixed window (`Agreeing`).
+own. Where these are faster, the product waits for a fixed window (`agreeing`).
 
 The tests are exact for the average of the folds' models. The exported model is fitted
 on all trials, a tenth (or a fifth) more, with its own choice of settings. On average it
@@ -25,9 +25,7 @@ explains. With the full risk for the tests, the smallest certified error was exc
 14 to 22 of 100 sets instead of ten, so they take half of it. `make risk` counts it.
 """
 
-from __future__ import annotations
-
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -144,67 +142,58 @@ def certify(course: Course, seconds: Floats) -> list[StoppingRule]:
     return best or [passed[0]]
 
 
-@dataclass(frozen=True)
-class Agreeing:
-    """The rules of a product and of its factors.
+def agreeing(
+    product: str,
+    factors: Collection[str],
+    rules: Mapping[str, Sequence[StoppingRule]],
+    courses: Mapping[str, Course],
+    seconds: Floats,
+) -> dict[str, list[StoppingRule]]:
+    """{task: its rules} of a product and of its factors, which follow the product's
+    rules at a pace of their own.
 
-    Attributes:
-        product: of the product, in the order of rising error.
-        factors: {factor: its rules}.
+    A factor is wrong only where its product is, so it may follow the product's rules.
+    Before them it has its own that err less often. No rule is slower for a factor than
+    those before it: one that waits for confidence is left out then, and a fixed window
+    serves the product alone, which needs no answers of its factors for it.
+
+    Args:
+        product: a task.
+        factors: its factors.
+        rules: {task: its certified rules}.
+        courses: {task: its course}.
+        seconds: (points,) windows.
     """
-
-    product: list[StoppingRule]
-    factors: dict[str, list[StoppingRule]]
-
-    @classmethod
-    def of(
-        cls,
-        product: Sequence[StoppingRule],
-        factors: Mapping[str, Sequence[StoppingRule]],
-        courses: Mapping[str, Course],
-        seconds: Floats,
-    ) -> Agreeing:
-        """The rules of a product that its factors follow, at a pace of their own.
-
-        A factor is wrong only where its product is, so it may follow the product's
-        rules. Before them it has its own that err less often. No rule is slower for a
-        factor than those before it: one that waits for confidence is left out then, and
-        a fixed window serves the product alone, which needs no answers of its factors
-        for it.
-
-        Args:
-            product: certified rules of the product.
-            factors: {factor: its certified rules}.
-            courses: {factor: its course}.
-            seconds: (points,) windows.
-        """
-        agreeing = cls([], {})
-        for factor, rules in factors.items():
-            stricter = [rule for rule in rules if rule.error < product[0].error]
-            agreeing.factors[factor] = stricter
-        for rule in product:
-            agreeing._add(rule, courses, seconds)
-        return agreeing
-
-    def _add(
-        self,
-        rule: StoppingRule,
-        courses: Mapping[str, Course],
-        seconds: Floats,
-    ) -> None:
-        """Add the next rule of the product, where it may follow those before it."""
-        followed = {}
-        for factor, rules in self.factors.items():
-            at, _ = courses[factor].under(rule)
-            mean_s = float(seconds[at].mean())
-            if not rules or mean_s <= rules[-1].mean_s + 1e-9:
-                followed[factor] = replace(rule, mean_s=mean_s)
-        if not is_fixed(rule) and len(followed) < len(self.factors):
-            if self.product:
-                return
+    least = rules[product][0].error
+    agreed: dict[str, list[StoppingRule]] = {product: []}
+    for factor in factors:
+        agreed[factor] = [rule for rule in rules[factor] if rule.error < least]
+    for rule in rules[product]:
+        followed = _followed(rule, {f: agreed[f] for f in factors}, courses, seconds)
+        if is_fixed(rule) or len(followed) == len(factors):
+            followed[product] = rule
+        elif not agreed[product]:
             # The full window errs no more often than any rule that is tested after it.
-            rule = replace(rule, mean_s=float(seconds[-1]), confidence=NEVER)
+            waits = replace(rule, mean_s=float(seconds[-1]), confidence=NEVER)
+            followed = {product: waits}
+        else:
             followed = {}
-        self.product.append(rule)
-        for factor, of_factor in followed.items():
-            self.factors[factor].append(of_factor)
+        for task, of_task in followed.items():
+            agreed[task].append(of_task)
+    return agreed
+
+
+def _followed(
+    rule: StoppingRule,
+    rules: Mapping[str, Sequence[StoppingRule]],
+    courses: Mapping[str, Course],
+    seconds: Floats,
+) -> dict[str, StoppingRule]:
+    """{factor: a rule} of those that it makes no slower than their rules so far."""
+    followed = {}
+    for factor, before in rules.items():
+        at, _ = courses[factor].under(rule)
+        mean_s = float(seconds[at].mean())
+        if not before or mean_s <= before[-1].mean_s + 1e-9:
+            followed[factor] = replace(rule, mean_s=mean_s)
+    return followed

@@ -16,11 +16,11 @@ trials (cody18, 140 trials: category by up to 0.10 instead of 0.07, three seeds)
 distance is that of its nearest twentieth (`train.model.pipeline.label_distances`). So
 it is the same for the folds' models, which have fewer trials, as for the exported one.
 
-Where entire groups, such as objects, are left out for a task, half of the answers that
-make its curve of the full window are to groups that the deciding model has not met. By
-those to known things alone, the answers to others are called 9 points too sure (cody18:
-category 81 % right); by those to others alone, known things are called 8 points too
-doubtful.
+Where entire groups, such as objects, are left out for a task, its curve of the full
+window is made of answers to groups that the deciding model has not met. No curve fits
+both populations. By that of known things, others are called 9 points too sure; by this
+one, known things 3 to 8 points too doubtful (cody18, three seeds: the calibration error
+of category is 0.04 instead of 0.11 for others, and 0.06 instead of 0.03 for known ones).
 
 **Rules** are certified by `train.model.rules`. They compare the confidences of all
 decision points with one threshold, by the curve of all points together.
@@ -62,7 +62,7 @@ from train.model.novelty import (
     limits_of,
 )
 from train.model.pipeline import Choices, ContactClassifier
-from train.model.rules import RISK, Agreeing, Course, candidates, certify
+from train.model.rules import RISK, Course, agreeing, candidates, certify
 from train.threads import single_thread
 
 FEWEST = 20
@@ -310,9 +310,7 @@ class SequentialClassifier:
         seconds = np.array(self.decision_points_s)
         rules = {task: certify(course, seconds) for task, course in courses.items()}
         for task, factors in self.products_.items():
-            of_factors = {factor: rules[factor] for factor in factors}
-            agreeing = Agreeing.of(rules[task], of_factors, courses, seconds)
-            rules |= {task: agreeing.product, **agreeing.factors}
+            rules |= agreeing(task, factors, rules, courses, seconds)
         full, _ = candidates(len(seconds))
         certified = {}
         for task, of_task in rules.items():
@@ -344,10 +342,7 @@ class SequentialClassifier:
             together = evidence.curve()
             if task == self._name:
                 evidence = replace(evidence, known=self._known[:, tests])
-            at_end = evidence.at(-1)
-            if task in never_met:
-                at_end = at_end.beside(never_met[task])
-            full = at_end.curve()
+            full = never_met.get(task, evidence.at(-1)).curve()
             curves = [evidence.curve()] * (len(self.decision_points_s) - 1) + [full]
             slopes, intercepts, doubts = zip(*map(astuple, curves), strict=True)
             stopping[task] = Stopping(

@@ -12,8 +12,8 @@ from edge.model.refusal import TEST_SHARE
 from train.model.rules import (
     NEVER,
     RISK,
-    Agreeing,
     Course,
+    agreeing,
     certify,
     stops,
     upper_limit,
@@ -132,8 +132,10 @@ class TestProduct:
             "fast": course(self.FAST, self.WRONG),
             "slow": course(self.SLOW, self.WRONG),
         }
-        agreeing = Agreeing.of(rules, known, courses, SECONDS)
-        return agreeing.product, agreeing.factors["fast"]
+        by_task = agreeing(
+            "product", known, {"product": rules, **known}, courses, SECONDS
+        )
+        return by_task["product"], by_task["fast"]
 
     def test_a_factor_follows_its_rules_at_its_own_pace_after_stricter_ones_of_its_own(
         self,
