@@ -38,6 +38,9 @@ from train.model.pipeline import Choice, Choices
 from train.model.stopping import Early
 from train.progress import bar
 
+FEW_TRIALS = 100
+"""With fewer trials the most accurate candidate is taken, whatever its price; with 140
+that gains less, and a dearer model takes longer to fit."""
 EARLY_SHARES = (0.25, 0.5, 0.75)
 """Parts of the full window at which the settings of the earlier decision points are
 chosen, by the mean of their accuracies."""
@@ -90,7 +93,8 @@ class Choosing:
         self._jobs = jobs
         self._progress = progress
         self._widths = dict(zip(dataset.names, dataset.widths(samples), strict=True))
-        self._is_few = bool(divisions.further)
+        is_few = len(divisions.folds) < FEW_TRIALS
+        self._is_few = is_few and bool(divisions.further)
         self._rule_of_groups = partial(rule_among, widths=self._widths)
         self._rule_of_trials = partial(self._rule_of_groups, is_few=self._is_few)
 
