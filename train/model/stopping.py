@@ -41,7 +41,6 @@ from train.data.vectors import Strings, Vectors
 from train.model.curves import Curve, cross_fitted
 from train.model.held_out import AtPoints, HeldOut, answers, held_out
 from train.model.never_met import (
-    is_unknown,
     known_of,
     remoteness_of,
     thing_folds,
@@ -51,6 +50,7 @@ from train.model.novelty import (
     FOLDS,
     UNUSUAL_RATE,
     NoveltySpace,
+    beyond,
     held_out_scores,
     limits_of,
 )
@@ -83,11 +83,6 @@ def excess_of(novelty: Novelty, scores: Floats) -> Floats:
     typical = np.array(novelty.typical)[:, None]
     ratios = np.maximum(np.nan_to_num(scores), typical) / typical
     return np.asarray(np.log(ratios))
-
-
-def is_unusual(novelty: Novelty, scores: Floats) -> Booleans:
-    """(points, n) whether contacts are unusual, from their novelty (points, n)."""
-    return np.asarray(scores > np.array(novelty.limits)[:, None])
 
 
 @dataclass(frozen=True)
@@ -247,8 +242,8 @@ class SequentialClassifier:
             left_out = self._left_out.part(self._things >= 0).remoteness
         self._bare = remoteness_of(tested.remoteness, left_out)
         self._known = known_of(self._bare, scores.remoteness)
-        self.unusual_ = is_unusual(self.novelty_, scores.novelty)
-        self.unknown_ = is_unknown(self._bare, scores.remoteness)
+        self.unusual_ = beyond(self.novelty_.limits, scores.novelty)
+        self.unknown_ = beyond(self._bare.limits, scores.remoteness)
 
     def _worth(self, vectors: Vectors) -> dict[str, float]:
         """What the doubt about names is worth, by answers to things that were left out;
@@ -266,7 +261,7 @@ class SequentialClassifier:
         excess = excess_of(self.novelty_, scores.novelty)
         curves = self._confidence(task, np.tile(margins, (len(excess), 1)), excess)
         confidence = curves * known_of(self._bare, scores.remoteness)
-        unknown = is_unknown(self._bare, scores.remoteness)
+        unknown = beyond(self._bare.limits, scores.remoteness)
         known = self.unknown_[-1, self._folds >= 0]
         return worth_of(known, unknown[-1], confidence[-1])
 
@@ -371,8 +366,8 @@ class SequentialClassifier:
             together[task] = pooled.probabilities(margins, excess)
             confidence[task] = self._confidence(task, margins, excess)
         confidence[self._name] *= known_of(self.remoteness_, scores.remoteness)
-        unusual = is_unusual(self.novelty_, scores.novelty)
-        doubts = unusual, is_unknown(self.remoteness_, scores.remoteness)
+        unusual = beyond(self.novelty_.limits, scores.novelty)
+        doubts = unusual, beyond(self.remoteness_.limits, scores.remoteness)
         tested = {task: y[task] != "" for task in right}
         return right, confidence, self._courses(together, right, doubts, tested)
 
