@@ -21,8 +21,8 @@ clear contacts wait as long as others.
 
 A touch that is unusual at a decision point waits, for the full window if it stays so:
 rules are tested with this wait. An error is a wrong label. The task that names things,
-which has most labels, names none that is unknown, so an `unknown` for a trained thing
-is an error of it too.
+which has most labels but for kinds such as category, names none that is unknown. So an
+`unknown` for a trained thing is an error of it too.
 """
 
 from __future__ import annotations
@@ -219,7 +219,9 @@ class SequentialClassifier:
 
     def _fit_novelty(self, vectors: Vectors, folds: Integers) -> None:
         """Fit the space of doubt, and set its limits by held-out trials."""
-        self._name = finest({task: vectors.y[task] for task in self.choices})
+        kinds = {*self.products_}.union(*self.products_.values())
+        names = self.choices.keys() - kinds or self.choices.keys()
+        self._name = finest({task: vectors.y[task] for task in names})
         labels = vectors.y[self._name]
         with single_thread():
             self.space_ = NoveltySpace.of(vectors.X, labels, vectors.columns)
