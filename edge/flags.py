@@ -53,7 +53,7 @@ FLAGS = {
     "unknown": (
         "the thing is far from all that training met: `label` is null, and the answers "
         "of other tasks stand. Only the task that names things, which has the most "
-        "labels, has this flag"
+        "labels but for kinds such as category, has this flag"
     ),
     "tie": "another label had the same number of votes",
     "unsure": "with `--error`: the window ended before the confidence was reached",

@@ -17,7 +17,7 @@ its nested accuracy. The row "export" has the interval that an export at the ful
 prints. The accuracy on other trials may lie outside it in one data set of twenty.
 
 The last table judges the confidence at the full window on new trials of known objects:
-its calibration error, and how many of them are flagged `unknown` where 1.5 % are asked
+its calibration error, and how many of them are flagged `unknown` where 1 % are asked
 for. Further rows are of data sets that are exported in full but for four objects: the
 board's own classifier decides on fresh touches of the others, and of the four that it
 never met.
@@ -47,7 +47,7 @@ from train.data.feature_sets import expand
 from train.data.parts import part
 from train.fitting import fit
 from train.model.held_out import answers
-from train.model.never_met import is_unknown
+from train.model.novelty import beyond
 from train.model.rules import RISK
 from train.report.work import Workers
 from train.simulate import scene as scenes
@@ -144,7 +144,7 @@ def judged(drawn, labels):
     model = fitted.sequential
     new = drawn.pooled(POINTS_S, rest, fitted.dataset.names)
     hits, confidences, courses = model.judged(new, y)
-    unknown = is_unknown(model.remoteness_, model.space_.scores(new).remoteness)[-1]
+    unknown = beyond(model.remoteness_.limits, model.space_.scores(new).remoteness)[-1]
     certified = []
     fronts = []
     trusted = []
@@ -152,7 +152,7 @@ def judged(drawn, labels):
         certified += certificates(task, model.stopping_[task], courses[task])
         fronts += front_points(task, points, right)
         doubts = trust(hits[task][-1], confidences[task][-1], unknown)
-        trusted.append({"task": task, "never met": "", **doubts})
+        trusted.append({"task": task, **doubts})
     return certified, fronts, trusted
 
 
@@ -215,7 +215,7 @@ def exported(seed):
     rows["right"] = rows["label"] == rows["truth"]
     rows["new"] = [fresh[i].labels["object"] in NEVER_MET for i in rows["touch"]]
     return [
-        {"task": task, "never met": new}
+        {"task": f"{task}, {'never met' if new else 'full export'}"}
         | trust(of["right"], of["confidence"], of["unknown"])
         for (task, new), of in rows.groupby(["task", "new"], sort=False)
     ]
@@ -252,7 +252,7 @@ def measure(sets, exports):
     trusted = [*trusted, *chain.from_iterable(full)]
     certified = summed_up(certified, ["task", "asked"], certificate)
     fronts = summed_up(fronts, ["task", "front"], interval)
-    trusted = summed_up(trusted, ["task", "never met"], confidence)
+    trusted = summed_up(trusted, ["task"], confidence)
     tables.write("risk", [certified, fronts, trusted])
     above = np.array([row["above"] for row in certified])
     outside = np.array([row["below the interval"] + row["above it"] for row in fronts])
@@ -291,7 +291,7 @@ def interval(rows):
 
 def confidence(rows):
     """Means of what the confidence was worth."""
-    means = rows.drop(columns=["task", "never met"]).mean()
+    means = rows.drop(columns="task").mean()
     row = {"sets": len(rows)}
     return row | {name: f"{mean:.3f}" for name, mean in means.items()}
 

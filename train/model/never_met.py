@@ -71,11 +71,6 @@ def known_of(remoteness: Remoteness, scores: Floats) -> Floats:
     return np.asarray(expit(slopes * np.log(middles / np.maximum(scores, TINY))))
 
 
-def is_unknown(remoteness: Remoteness, scores: Floats) -> Booleans:
-    """(decision points, n) whether the things of contacts are unknown."""
-    return np.asarray(scores > np.array(remoteness.limits)[:, None])
-
-
 def _curve(known: Floats, left_out: Floats) -> tuple[float, float]:
     """Middle and slope of a decision point, by the remoteness of contacts (n,) and
     (m,)."""

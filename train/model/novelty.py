@@ -27,6 +27,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 from joblib import Parallel, delayed
@@ -37,14 +38,11 @@ from edge.arrays import Booleans, Floats, Integers
 from train.data.vectors import Strings
 from train.threads import single_thread
 
-UNUSUAL_RATE = 0.01
-UNKNOWN_RATE = 0.015
-"""Shares of contacts with trained things that may be flagged. As some have both flags,
-2 % have one."""
+UNUSUAL_RATE = 0.02
+UNKNOWN_RATE = 0.01
+"""Shares of contacts with trained things that may be flagged."""
 BESIDE = 0.25
 """Weight of directions that tell no labels apart, a power of two."""
-PRIOR_TRIALS = 3.0
-"""A label's spacing counts so many trials of the mean spacing."""
 TAIL = 0.1
 FOLDS = 20
 """Folds of the held-out scores: more than a choice has, as a space of fewer trials finds
@@ -94,8 +92,7 @@ class NoveltyPoint:
     unit: float
 
 
-@dataclass(frozen=True)
-class Scores:
+class Scores(NamedTuple):
     """How unlike all training trials vectors are.
 
     Attributes:
@@ -107,7 +104,7 @@ class Scores:
 
     def part(self, trials: Booleans) -> Scores:
         """Those of some vectors, by a mask (m,)."""
-        return Scores(self.novelty[:, trials], self.remoteness[:, trials])
+        return Scores(*(score[:, trials] for score in self))
 
 
 @dataclass(frozen=True)
@@ -151,8 +148,7 @@ class NoveltySpace:
     def scores(self, X: Floats) -> Scores:
         """The scores of vectors (decision points, m, p)."""
         pairs = map(self._scores, self.points, X)
-        novelty, remoteness = map(np.stack, zip(*pairs, strict=True))
-        return Scores(novelty, remoteness)
+        return Scores(*map(np.stack, zip(*pairs, strict=True)))
 
     def coordinates(self, point: int, x: Floats) -> Floats:
         """(m, components) whole coordinates of vectors (m, p) at a decision point."""
@@ -279,8 +275,7 @@ def _nearness(rows: Floats, labels: Strings) -> Floats:
     usual = float(alone[has_others].mean()) if has_others.any() else 1.0
     alone[~has_others] = usual
     _, classes = np.unique(labels, return_inverse=True)
-    sums = np.bincount(classes, alone) + PRIOR_TRIALS * usual
-    of_label = sums / (np.bincount(classes) + PRIOR_TRIALS)
+    of_label = np.bincount(classes, alone) / np.bincount(classes)
     spacing = np.maximum(0.5 * (alone + of_label[classes]), 1.0)
     return _in_float32(spacing**-2.0)
 
@@ -303,11 +298,10 @@ def held_out_scores(
     """
     count = int(folds.max()) + 1
     work = (delayed(_fold_scores)(X, labels, folds == k, widths) for k in range(count))
-    scores = Scores(np.full(X.shape[:2], np.nan), np.full(X.shape[:2], np.nan))
+    scores = np.full((2, *X.shape[:2]), np.nan)
     for k, of_fold in enumerate(Parallel(n_jobs=jobs)(work)):
-        scores.novelty[:, folds == k] = of_fold.novelty
-        scores.remoteness[:, folds == k] = of_fold.remoteness
-    return scores
+        scores[:, :, folds == k] = of_fold
+    return Scores(*scores)
 
 
 def _fold_scores(
@@ -340,3 +334,8 @@ def limits_of(scores: Floats, rate: float) -> tuple[tuple[float, ...], ...]:
         limits.append(math.exp(tail + excess * math.log(TAIL / rate)))
     typical = np.exp(np.median(logs, axis=1)).tolist()
     return tuple(typical), tuple(limits)
+
+
+def beyond(limits: Sequence[float], scores: Floats) -> Booleans:
+    """(decision points, m) whether scores lie beyond the limits of their points."""
+    return np.asarray(scores > np.array(limits)[:, None])

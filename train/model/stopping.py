@@ -27,8 +27,8 @@ decision points with one threshold, by the curve of all points together.
 
 A touch that is unusual at a decision point waits, for the full window if it stays so:
 rules are tested with this wait. An error is a wrong label. The task that names things,
-which has most labels, names none that is unknown, so an `unknown` for a trained thing
-is an error of it too.
+which has most labels but for kinds such as category, names none that is unknown. So an
+`unknown` for a trained thing is an error of it too.
 """
 
 from __future__ import annotations
@@ -48,7 +48,6 @@ from train.data.vectors import Strings, Vectors
 from train.model.curves import Curve, Evidence, cross_fitted
 from train.model.held_out import AtPoints, HeldOut, answers, held_out
 from train.model.never_met import (
-    is_unknown,
     known_of,
     remoteness_of,
     thing_folds,
@@ -58,6 +57,7 @@ from train.model.novelty import (
     FOLDS,
     UNUSUAL_RATE,
     NoveltySpace,
+    beyond,
     held_out_scores,
     limits_of,
 )
@@ -90,11 +90,6 @@ def excess_of(novelty: Novelty, scores: Floats) -> Floats:
     typical = np.array(novelty.typical)[:, None]
     ratios = np.maximum(np.nan_to_num(scores), typical) / typical
     return np.asarray(log(ratios))
-
-
-def is_unusual(novelty: Novelty, scores: Floats) -> Booleans:
-    """(points, n) whether contacts are unusual, from their novelty (points, n)."""
-    return np.asarray(scores > np.array(novelty.limits)[:, None])
 
 
 @dataclass(frozen=True)
@@ -235,7 +230,9 @@ class SequentialClassifier:
 
     def _fit_novelty(self, vectors: Vectors, folds: Integers) -> None:
         """Fit the space of doubt, and set its limits by held-out trials."""
-        self._name = finest({task: vectors.y[task] for task in self.choices})
+        kinds = {*self.products_}.union(*self.products_.values())
+        names = self.choices.keys() - kinds or self.choices.keys()
+        self._name = finest({task: vectors.y[task] for task in names})
         labels = vectors.y[self._name]
         with single_thread():
             self.space_ = NoveltySpace.of(vectors.X, labels, vectors.columns)
@@ -258,8 +255,8 @@ class SequentialClassifier:
             left_out = self._left_out.part(self._things >= 0).remoteness
         self._bare = remoteness_of(tested.remoteness, left_out)
         self._known = known_of(self._bare, scores.remoteness)
-        self.unusual_ = is_unusual(self.novelty_, scores.novelty)
-        self.unknown_ = is_unknown(self._bare, scores.remoteness)
+        self.unusual_ = beyond(self.novelty_.limits, scores.novelty)
+        self.unknown_ = beyond(self._bare.limits, scores.remoteness)
 
     def _worth(self, never_met: Mapping[str, Evidence]) -> dict[str, float]:
         """What the doubt about names is worth, by answers to things that were left out;
@@ -273,7 +270,7 @@ class SequentialClassifier:
         remoteness = self._left_out.remoteness[:, tested]
         confidence = curve.probabilities(answers.margins, answers.excess)
         confidence = confidence * known_of(self._bare, remoteness)[-1]
-        unknown = is_unknown(self._bare, remoteness)[-1]
+        unknown = beyond(self._bare.limits, remoteness)[-1]
         known = self.unknown_[-1, self._folds >= 0]
         return worth_of(known, unknown, confidence)
 
@@ -392,8 +389,8 @@ class SequentialClassifier:
             by_point = map(Curve.probabilities, curves, margins, excess)
             confidence[task] = np.stack(list(by_point))
         confidence[self._name] *= known_of(self.remoteness_, scores.remoteness)
-        unusual = is_unusual(self.novelty_, scores.novelty)
-        doubts = unusual, is_unknown(self.remoteness_, scores.remoteness)
+        unusual = beyond(self.novelty_.limits, scores.novelty)
+        doubts = unusual, beyond(self.remoteness_.limits, scores.remoteness)
         tested = {task: y[task] != "" for task in right}
         return right, confidence, self._courses(together, right, doubts, tested)
 

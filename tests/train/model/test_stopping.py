@@ -152,3 +152,14 @@ def test_too_few_trials_are_refused():
         InputError, match="calibration needs at least 20 trials, not 19"
     ):
         calibrated(of_neighbours(1), X, {"t": labels})
+
+
+def test_a_kind_is_no_name_though_it_has_more_labels():
+    X, labels = touches(60)
+    moves = np.where(np.arange(60) % 2, "fixed", "movable")
+    y = {"kind": np.char.add(labels, moves), "soft": labels, "moves": moves}
+    y["thing"] = np.where(np.arange(60) < 30, "cup", "box")
+    choices = dict.fromkeys(y, Choice("none", 3, 1))
+    stopping = calibrated(choices, X, y).stopping_
+    named = [task for task, of_task in stopping.items() if of_task.remoteness]
+    assert named == ["thing"]
