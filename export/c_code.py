@@ -325,7 +325,7 @@ def _tasks(
     source.define("EARLY", int(error is not None))
     for output in ("out_of_range", "novelty", "remoteness"):
         source.define(f"PLACE_{output.upper()}", places.get(output, 0))
-    rows = []
+    rows: list[list[object]] = []
     for name, task in info.tasks.items():
         stopping = info.stopping.get(name)
         curves: list[tuple[float, ...]] = [(0.0, 0.0, 0.0)]
