@@ -1,33 +1,38 @@
-"""Taxels that stay above the threshold without a touch, as they are stuck or leant on,
+"""Taxels that are above the threshold without a touch, as they are broken or leant on,
 are set aside before contacts are followed."""
 
+from __future__ import annotations
+
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from edge.arrays import Booleans, Integers
+from edge.arrays import Integers
 from edge.touch.active import ActiveTaxels
 from edge.touch.contact import Contact
 from edge.touch.frame import Frame
 from edge.touch.layout import SkinLayout
 from edge.touch.track import ContactTracker, active_taxels
 
-STILL_S = 2.0
-"""A taxel whose count stays the same for so long is not touched. It takes a second more
-than contacts are followed, where that is longer."""
+if TYPE_CHECKING:
+    from edge.touch.lasting import LastingContacts
+
+LONG_S = 2.0
+"""No touch is longer, or than a second more than contacts are followed."""
 EARLY_S = 0.3
 """Seconds within which a touch that was under way in the first frame changes."""
 LONGEST_EARLY_S = 10.0
 """Seconds of first frames that are kept while what is set aside may be a touch."""
 CHECK_S = 0.25
 """Time between two looks at the counts."""
-STILL_SHARE = 0.05
-"""Part of its count by which a still taxel may change; noise may change it by half of
-the threshold."""
-MOVED_SHARE = 0.25
-"""Part of its count by which a taxel that was set aside changes where it is touched; at
-least the threshold."""
+MOVED_SHARE = 4
+"""A touch adds more than the level of a taxel over this, and than the threshold."""
+
+FALL_SHARE = 8
+"""Part of it by which a level falls from look to look at most: who leans on the skin may
+swing."""
 
 
 @dataclass(frozen=True)
@@ -35,8 +40,8 @@ class View:
     """What of a frame is to be followed.
 
     Attributes:
-        frame: of the skin.
-        active: its active taxels, without those that are set aside.
+        frame: of the skin, without what is set aside.
+        active: its active taxels.
         late: it shows a touch that was under way before it.
     """
 
@@ -49,32 +54,46 @@ class StillTaxels:
     """The taxels that are set aside, so that what happens beside them is followed.
 
     What is above the threshold in the first frame is set aside at once: it may be a
-    stuck taxel, or a touch under way, which changes. Later a taxel is set aside once it
-    has been still. It is taken back when it falls to the threshold, or changes as in a
-    touch; where it then returns to its former count, it is set aside at once.
+    stuck taxel, or a touch under way, which changes. Later what has been in contact for
+    longer than a touch lasts is set aside where it is still, or where a contact begins
+    beside it. A taxel that is restless, alone or with few, is broken.
+
+    Of a taxel that is set aside the level is subtracted, so that a touch on what leans
+    there is felt. The level follows the highest count from look to look, and is gone
+    after a look without contact. A broken taxel counts 0.
 
     Attributes:
-        aside: (rows, cols), True on the taxels that are set aside.
-        touched: the last frame showed that they are touched, as they changed.
+        aside: (rows, cols), True on the taxels that are set aside, or will be once
+            there is a touch beside them.
+        touched: the last frame showed that some of them are touched.
+        over: what was followed up to the last frame is set aside.
         early: the first frames, while what is set aside may turn out to be a touch.
+        began_s: the time of the first frame.
     """
 
     def __init__(self, layout: SkinLayout, horizon_s: float) -> None:
         """Watch a skin on which contacts are followed for `horizon_s`."""
         self.aside = np.zeros(layout.shape, dtype=np.bool_)
         self.touched = False
+        self.over = False
         self.early: list[View] = []
         self._layout = layout
-        self._threshold = layout.threshold_counts
         self._longest_s = min(horizon_s, LONGEST_EARLY_S)
-        self._began_s = math.nan
+        self.began_s = math.nan
         longest_s = horizon_s if math.isfinite(horizon_s) else 0.0
-        self._still_s = max(STILL_S, longest_s + 1.0)
-        self._reference = np.zeros(layout.shape, dtype=np.int64)
-        self._looks = np.zeros(layout.shape, dtype=np.int64)
-        """For how many looks each count has been the same."""
+        self._long_looks = int(max(LONG_S, longest_s + 1.0) / CHECK_S) + 1
+        self._broken = self.aside
         self._levels = np.zeros(layout.shape, dtype=np.int64)
-        """The counts of taxels that have been set aside; 0 of all others."""
+        """The counts at rest of taxels that are set aside; 0 of all others."""
+        self._hidden = self.aside
+        """Both of them."""
+        self._peaks = self._levels.copy()
+        """The highest count of each active taxel since the last look."""
+        self._looks = self._levels
+        """For how many looks each taxel has been in contact."""
+        self._often = self._levels
+        """Three times the looks in which it was, less the others."""
+        self._lasting: LastingContacts | None = None
         self._next_s = -math.inf
 
     def filter(self, frame: Frame) -> list[View]:
@@ -83,63 +102,100 @@ class StillTaxels:
         Before it come the first frames, where it shows that what was set aside in them
         is a touch.
         """
-        active = active_taxels(frame, self._layout)
-        self._watch(frame, active)
-        age_s = frame.t - self._began_s
-        now = View(frame, active)
-        if not (self.touched or self.aside.any()):
+        now = View(frame, active_taxels(frame, self._layout))
+        self._watch(now)
+        beside = self._beside(now)
+        if not self._hidden.any():
             self.early = []
             return [now]
-        beside = active_taxels(frame, self._layout, self.aside)
-        if self.touched or self._grows(active, beside, age_s):
-            early = self.early if age_s <= EARLY_S else []
+        age_s = frame.t - self.began_s
+        if self.early and age_s <= EARLY_S and self._is_touch(now, beside):
+            early = self.early
             self.early = []
+            self._levels[:] = 0
+            self._hidden = self._broken
             return [*early, now]
+        if self.touched:
+            self.early = []
         if age_s == 0.0 or (self.early and age_s <= self._longest_s):
-            self.early.append(View(frame, active, late=True))
-        return [View(frame, beside)]
+            self.early.append(View(frame, now.active, late=True))
+        return [beside]
 
-    def _grows(self, active: ActiveTaxels, beside: ActiveTaxels, age_s: float) -> bool:
-        """Whether what was set aside in the first frame soon grows."""
-        return age_s <= EARLY_S and bool(self.early) and _grown(active, beside)
+    def _is_touch(self, now: View, beside: View) -> bool:
+        """Whether what was set aside in the first frame changes, or grows."""
+        change = np.abs(now.frame.counts - self._levels)
+        moved = (self._levels > 0) & (change > self._least())
+        return bool(moved.any()) or _grown(now.active, beside.active)
 
-    def _watch(self, frame: Frame, active: ActiveTaxels) -> None:
-        """Set taxels aside or take them back, by a frame and its active taxels."""
-        self.touched = False
+    def _least(self) -> Integers:
+        """(rows, cols) the change above which a taxel is touched."""
+        return np.maximum(self._layout.threshold_counts, self._levels // MOVED_SHARE)
+
+    def _watch(self, now: View) -> None:
+        """Look at the counts from time to time."""
+        frame = now.frame
+        np.maximum(self._peaks, frame.counts, out=self._peaks, where=now.active.mask)
+        if self._lasting is not None:
+            self._lasting.add(frame.counts.astype(np.int64))
         if self._next_s == -math.inf:
-            self._began_s = frame.t
-            self._set_aside(frame, active.mask)
-        elif self.aside.any():
-            self._take_back(frame, active.mask)
+            self.began_s = frame.t
+            self._levels = self._peaks.copy()
+        self.over = False
         if frame.t >= self._next_s:
             self._next_s = frame.t + CHECK_S
-            self._look(frame, active)
+            former = self._hidden
+            self._look()
+            np.copyto(self._peaks, frame.counts, where=now.active.mask)
+            self.over = bool((self._hidden & ~former).any())
 
-    def _take_back(self, frame: Frame, active: Booleans) -> None:
-        change = np.abs(frame.counts - self._levels)
-        most = np.maximum(self._threshold, MOVED_SHARE * self._levels)
-        self.touched = bool((self.aside & (change > most)).any())
-        self.aside = self.aside & active & (not self.touched)
+    def _look(self) -> None:
+        """Follow the levels, and set aside what has long been in contact."""
+        peaks = self._peaks
+        self._peaks = np.zeros_like(peaks)
+        touched = peaks > self._levels + self._least()
+        self._looks = np.where(touched, self._looks + 1, 0)
+        self._often = np.maximum(self._often + np.where(touched, 3, -1), 0)
+        at_rest = (self._levels > 0) & ~touched
+        if self._lasting is not None:
+            self._lasting.look(peaks, touched, self._looks)
+            self._broken = self._lasting.broken
+            at_rest |= self._lasting.still
+        elif (self._often >= 2 * self._long_looks).any():
+            from edge.touch.lasting import LastingContacts  # few touches last so long
 
-    def _look(self, frame: Frame, active: ActiveTaxels) -> None:
-        if not active.bits:
-            self._looks[:] = 0
-            return
-        same = active.mask & self._near(frame, self._reference)
-        self._looks = np.where(same, self._looks + 1, 0)
-        np.copyto(self._reference, frame.counts, where=~same)
-        unchanged = active.mask & (self._levels > 0) & self._near(frame, self._levels)
-        still = unchanged | (self._looks * CHECK_S >= self._still_s)
-        if still.any() and not self.touched:
-            self._set_aside(frame, still)
+            self._lasting = LastingContacts(self._layout, self._long_looks)
+        falling = np.where(peaks > 0, self._levels - self._levels // FALL_SHARE, 0)
+        followed = np.maximum(peaks, falling)
+        self._levels = np.where(at_rest, followed, self._levels)
+        self._levels[self._broken] = 0
+        self._hidden = self._broken | (self._levels > 0)
+        self.aside = self._hidden
+        if self._lasting is not None:
+            self.aside = self._hidden | self._lasting.lone
 
-    def _near(self, frame: Frame, counts: Integers) -> Booleans:
-        most = np.maximum(0.5 * self._threshold, STILL_SHARE * counts)
-        return np.asarray(np.abs(frame.counts - counts) <= most)
+    def _beside(self, now: View) -> View:
+        """What a frame shows beside what is set aside, and above its level."""
+        view = now
+        if self._hidden.any():
+            change = now.frame.counts - self._levels
+            moved = (self._levels > 0) & (change > self._least())
+            self.touched = bool(moved.any())
+            hidden = self._broken if self.touched else self._hidden
+            view = self._shown(now, np.where(hidden, 0, np.maximum(change, 0)))
+        if self.over:
+            self.over = not view.active.bits
+        long = None if self._lasting is None else self._lasting.hides(view.active)
+        if long is not None:
+            self._levels = np.where(long, self._peaks, self._levels)
+            self._hidden = self._hidden | long
+            self.over = True
+            view = self._shown(now, np.where(long, 0, view.frame.counts))
+        return view
 
-    def _set_aside(self, frame: Frame, taxels: Booleans) -> None:
-        np.copyto(self._levels, frame.counts, where=taxels & ~self.aside)
-        self.aside = self.aside | taxels
+    def _shown(self, now: View, counts: Integers) -> View:
+        """The view with other counts."""
+        frame = replace(now.frame, counts=counts.astype(np.uint16))
+        return View(frame, active_taxels(frame, self._layout))
 
 
 class WatchfulTracker:
@@ -152,12 +208,15 @@ class WatchfulTracker:
     Attributes:
         tracker: follows the contacts.
         still: the taxels that are set aside.
+        seen: the last frame as it was followed, or whole while it may show a touch that
+            was under way in the first.
     """
 
     def __init__(self, tracker: ContactTracker) -> None:
         """Watch over a fresh tracker."""
         self.tracker = tracker
         self.still = StillTaxels(tracker.layout, tracker.horizon_s)
+        self.seen: Frame
 
     @property
     def horizon_s(self) -> float:
@@ -168,11 +227,15 @@ class WatchfulTracker:
         """As `ContactTracker.push`, without the taxels that are set aside."""
         self.tracker.check(frame)
         contacts: list[Contact] = []
-        for view in self.still.filter(frame):
+        views = self.still.filter(frame)
+        is_early = frame.t - self.still.began_s <= EARLY_S
+        self.seen = frame if is_early else views[-1].frame
+        over = self.tracker.end(views[-1].active) if self.still.over else []
+        for view in views:
             contacts = self._follow(view)
         if contacts:
             self.still.early = []
-        return contacts
+        return over + contacts
 
     def finish(self) -> list[Contact]:
         """The contacts of the first frame that never changed, where the stream has had
