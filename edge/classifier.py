@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from edge.recording import Recording
     from edge.skin.loop import JointSource
     from edge.skin.skin import Skin
-    from edge.touch.still import StillTaxels
+    from edge.touch.still import WatchfulTracker
 
 ASKED_A_SECOND = 200.0
 """Questions to the model about several contacts. Each takes one to two milliseconds on
@@ -56,16 +56,16 @@ class Pending:
 class AsideEvents:
     """Names the taxels that have been set aside or taken back for a while."""
 
-    def __init__(self, still: StillTaxels) -> None:
-        self._still = still
-        self._named = np.zeros_like(still.aside)
+    def __init__(self, tracker: WatchfulTracker) -> None:
+        self._tracker = tracker
+        self._named = tracker.aside
         """(rows, cols) the taxels that the last event named."""
         self._named_s = -math.inf
         """When they were last those that are set aside."""
 
     def at(self, t: float) -> list[Event]:
         """The event, if there is one, after a frame at a time."""
-        aside = self._still.aside
+        aside = self._tracker.aside
         if self._named_s == -math.inf or (aside == self._named).all():
             self._named_s = t
         if t - self._named_s < ASIDE_S:
@@ -164,7 +164,7 @@ class Classifier:
         """The numbers of the contacts under way; None if one is followed."""
         self._begun = 0
         self._end_s: float | None = None
-        self._aside = AsideEvents(self.tracker.still)
+        self._aside = AsideEvents(self.tracker)
         self._untouched: Untouched | None = None
         if any(task.no_contact is not None for task in model.info.tasks.values()):
             from edge.no_contact import Untouched  # few models know no contact

@@ -113,7 +113,7 @@ class Trials:
         # The last second of a trial may be as still as it likes.
         tracker = ContactTracker(skin.layout, horizon_s=length_s - 1.0)
         self._tracker = WatchfulTracker(tracker)
-        self.aside = AsideEvents(self._tracker.still)
+        self.aside = AsideEvents(self._tracker)
         self._length = length_s
         self._before: deque[Frame] = deque(
             maxlen=round(LEAD_S / skin.period_s) + DEBOUNCE
@@ -125,7 +125,7 @@ class Trials:
     def push(self, frame: Frame) -> list[Frame] | None:
         """Take in a frame; returns the frames of a trial that this frame completes."""
         contact = next(iter(self._tracker.push(frame)), None)
-        frame = self._tracker.seen
+        frame = self._tracker.seen or frame
         if self._frames is not None:
             self._frames.append(frame)
         else:

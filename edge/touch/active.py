@@ -103,25 +103,6 @@ class ActiveTaxels:
         bits, peak = largest_bits(self._grid, self._padded, self.counts, before)
         return Region(self._grid, bits, peak)
 
-    def small(self, bits: int, most: int) -> Booleans:
-        """(rows, cols), True where regions of at most some taxels have one of `bits`."""
-        small = 0
-        while bits:
-            region = bits & -bits
-            for _ in range(most):
-                region |= self._grid.neighbours(region) & self.bits
-            if region.bit_count() <= most:
-                small |= region
-            bits &= ~region
-        return self._grid.unpack(small)
-
-    def connected(self, bits: int) -> Region | None:
-        """The active taxels that are connected to some taxels, or next to them; None
-        where that takes too long."""
-        seeds = (bits | self._grid.neighbours(bits)) & self.bits
-        joined = self._grid.flood(seeds, self.bits)
-        return None if joined is None else Region(self._grid, joined, 0)
-
     def has_other(self, region: Region, onset: int) -> bool:
         """Whether a taxel beside a region is above the onset."""
         beside = self.bits & ~region.bits

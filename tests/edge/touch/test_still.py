@@ -4,7 +4,7 @@ touched."""
 import pytest
 
 from edge.touch.layout import SkinLayout
-from edge.touch.still import CHECK_S, EARLY_S, StillTaxels, WatchfulTracker
+from edge.touch.still import WatchfulTracker
 from edge.touch.track import ContactTracker
 from tests.edge.touch.pressed import pressed
 
@@ -104,32 +104,17 @@ def test_gaps_are_no_stillness():
     assert [contact.onset_s for contact in contacts] == [1.0]
 
 
-@pytest.fixture
-def still():
-    return StillTaxels(LAYOUT, 1.0)
-
-
-def push(still, t, taxels):
-    still.filter(pressed(LAYOUT, t, taxels))
-
-
 @pytest.mark.parametrize(
-    ("level", "change", "touched"),
-    [
-        (120, 40, False),
-        (120, 41, True),
-        (120, -120, False),
-        (4000, 1000, False),
-        (4000, 1001, True),
-    ],
+    ("level", "change", "felt"),
+    [(120, 40, 0), (120, 41, 41), (120, -120, 0), (4000, 1000, 0), (4000, 1001, 1001)],
 )
 def test_more_than_the_threshold_and_a_quarter_of_the_level_is_a_touch(
-    still, level, change, touched
+    level, change, felt
 ):
-    push(still, 0.0, {(1, 1): level})
-    push(still, 1.0, {(1, 1): level})
-    push(still, 1.1, {(1, 1): level + change})
-    assert still.touched is touched
+    tracker = watchful(1.0)
+    for t, count in ((0.0, level), (1.0, level), (1.1, level + change)):
+        tracker.push(pressed(LAYOUT, t, {(1, 1): count}))
+    assert tracker.seen.counts[1, 1] == felt
 
 
 def test_a_touch_of_what_is_set_aside_is_followed_without_its_level():
@@ -146,9 +131,10 @@ def test_the_level_follows_what_leans_more_and_more():
         assert not tracker.push(pressed(LAYOUT, i * PERIOD_S, {(2, 2): count}))
 
 
-def test_a_quiet_taxel_is_taken_back(still):
-    push(still, 0.0, {(1, 1): 50})
-    assert still.aside.any()
-    for i in range(3):
-        push(still, EARLY_S + i * CHECK_S, {(1, 1): 30})
-    assert not still.aside.any()
+def test_a_quiet_taxel_is_taken_back():
+    tracker = watchful(1.0)
+    tracker.push(pressed(LAYOUT, 0.0, {(1, 1): 50}))
+    assert tracker.aside.any()
+    for t in (0.3, 0.6, 0.9):
+        tracker.push(pressed(LAYOUT, t, {(1, 1): 30}))
+    assert not tracker.aside.any()

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from edge.recording import Recording
-from edge.touch.lasting import QUIET_LOOKS
-from edge.touch.still import CHECK_S, WatchfulTracker
+from edge.touch.aside import CHECK_S, QUIET_LOOKS
+from edge.touch.still import WatchfulTracker
 from edge.touch.track import ContactTracker
 from tests.conftest import FOREARM, in_a_row, touch
 
@@ -60,7 +60,7 @@ def contacts_of(frames, watchful=True):
     for frame in recording(frames):
         for contact in (watched if watchful else tracker).push(frame):
             contacts[contact.onset_s] = contact
-        for place in map(tuple, np.argwhere(watched.still.aside).tolist()):
+        for place in map(tuple, np.argwhere(watched.aside).tolist()):
             named.setdefault(place, frame.t)
     return contacts, named
 
@@ -116,7 +116,7 @@ def test_a_broken_taxel_is_followed_again_after_ten_quiet_seconds():
     last_s = 0.0
     for frame in recording(with_taxels(quiet, PLACES[:1], flickers)):
         tracker.push(frame)
-        if tracker.still.aside.any():
+        if tracker.aside.any():
             last_s = frame.t
     assert last_s == pytest.approx(5.0 + QUIET_LOOKS * CHECK_S, abs=2 * CHECK_S)
 
