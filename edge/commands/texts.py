@@ -116,7 +116,8 @@ def _aside(line: Line) -> str:
         return _at(line["t"], "all taxels are followed again")
     places = ", ".join(f"({row}, {col})" for row, col in taxels[:MOST_PLACES])
     more = " ..." if len(taxels) > MOST_PLACES else ""
-    return _at(line["t"], f"ignored as still: taxels {places}{more}")
+    remedy = "free them, or put broken ones into `dead` of the skin file"
+    return _at(line["t"], f"ignored: taxels {places}{more}; {remedy}")
 
 
 def _end(line: Line) -> str:
