@@ -35,7 +35,7 @@ UNDO = ".edge-classify-undo.json"
 DELETED = ".edge-classify-deleted"
 """The folder of recordings that were deleted last."""
 LOOK_S = 0.02
-LOOKS = 500
+LOOKS = 250
 """How often to look whether another program has ended."""
 
 
@@ -175,7 +175,7 @@ def alone(folders: Iterable[Path]) -> Iterator[None]:
         InputError: another program changes them, or a change cannot be finished.
     """
     with ExitStack() as stack:
-        for folder in sorted(set(folders)):
+        for folder in sorted({folder.resolve() for folder in folders}):
             with suppress(OSError):  # Windows opens no folder; others name what fails
                 handle = os.open(folder, os.O_RDONLY)
                 stack.callback(os.close, handle)

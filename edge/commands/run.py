@@ -69,7 +69,8 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         type=within(float, 1.0, 1e6),
         default=200.0,
         metavar="MB",
-        help="most megabytes of kept touches; the oldest go first (default: %(default)g)",
+        help="most megabytes of kept touches; the oldest without a label go first "
+        "(default: %(default)g)",
     )
 
 

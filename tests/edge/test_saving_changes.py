@@ -132,6 +132,13 @@ def test_two_programs_do_not_change_one_folder(new_days, words, refused, monkeyp
     assert load(day / "a.npz").labels == {}
 
 
+def test_a_folder_may_be_named_in_two_ways(new_days, monkeypatch):
+    monkeypatch.setattr(saving, "LOOKS", 1)
+    day, _ = new_days()
+    with alone([day, day / ".." / day.name]):
+        assert find([str(day)])
+
+
 def test_a_reader_waits_for_a_change_that_is_under_way(new_days, monkeypatch):
     monkeypatch.setattr(saving, "LOOKS", 1)
     day, _ = new_days()

@@ -228,10 +228,10 @@ def _with_joints(
 ) -> tuple[Samples, pd.Index]:
     """The frames and their rows, with joint angles that may stand in rows of their
     own."""
+    where = samples.where
     known = np.isfinite(angles).all(axis=1)
     if known.all() or not known.any():
-        return replace(samples, joints=angles), rows
-    where = samples.where
+        return replace(samples, joints=clock.complete(angles, where)), rows
     felt = np.isfinite(samples.values).any(axis=(1, 2))
     order = clock.order(samples.t[known], where, str(rows.name), rows[known]).kept
     joints_t = samples.t[known][order]

@@ -43,9 +43,7 @@ def test_data_without_thresholds_get_those_of_their_noise(make_touch, tmp_path, 
             np.maximum(touch.frames, noise),
         )
     words = ["import", "csv", str(tmp_path / "csv"), "--frames", "--out"]
-    leftover = left_by_a_dead_run(tmp_path / "out")
     assert main([*words, str(tmp_path / "out")]) == 0
-    assert not leftover.exists()
     assert (
         "threshold 80 and onset 120 counts, from the noise before contact: 2 of 2 have "
         "a" in (capsys.readouterr().out)
@@ -65,7 +63,9 @@ def test_warnings_that_are_alike_are_counted(make_touch, tmp_path, capsys):
         write_frames(tmp_path / "csv" / name, touch.t, touch.frames + 500)
     (tmp_path / "csv" / "skin.json").write_text('{"threshold_counts": 90}')
     out = tmp_path / "out"
+    leftover = left_by_a_dead_run(out)
     main(["import", "csv", str(tmp_path / "csv"), "--frames", "--out", str(out)])
+    assert not leftover.exists()
     lines = capsys.readouterr().err.splitlines()
     (warning,) = [line for line in lines if "its first frame is above" in line]
     assert warning.startswith(f"train: {out / 'a.npz'}: ")
