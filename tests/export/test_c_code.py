@@ -20,7 +20,7 @@ from edge.touch.layout import SkinLayout
 from export import c_code
 from export.c_graph import CompiledGraph, table_of
 from export.graph import to_onnx
-from tests.conftest import export, in_a_row, save_touches, touch
+from tests.conftest import ROOT, ended, export, in_a_row, save_touches, touch
 from tests.edge.model.test_engines import hostile
 from tests.export.microcontroller import machine
 from tests.export.test_graph import fit, hard_set
@@ -278,6 +278,21 @@ def test_every_feature_of_damaged_recordings_has_the_same_bits(
     questions = [machine.about_recording(kind, recording) for recording in recordings]
     expected = [machine.vectors(model, [0], recording) for recording in recordings]
     assert same(machine.ask(command, tmp_path, questions), np.concatenate(expected))
+
+
+@needs_gcc
+@pytest.mark.skipif(shutil.which("g++") is None, reason="there is no C++ compiler")
+def test_the_sketch_suits_the_header(tmp_path, monkeypatch):
+    """Checked against the declarations of Arduino's core."""
+    model = Model(demo.MODEL)
+    model.info = replace(model.info, layout=SkinLayout(1, 12))
+    monkeypatch.setattr(c_code, "CompiledGraph", NoGraph)
+    c_code.write(model, tmp_path)
+    shutil.copy(ROOT / "tests" / "arduino.h", tmp_path / "Wire.h")
+    sketch = ROOT / "docs" / "examples" / "firmware" / "decide" / "decide.ino"
+    command = ["g++", "-std=c++11", "-Wall", "-fsyntax-only", f"-I{tmp_path}", "-xc++"]
+    compiled = ended(*command, sketch)
+    assert compiled.returncode == 0, compiled.stderr
 
 
 @needs_gcc
