@@ -10,7 +10,7 @@ PIP := $(BIN)/$(PINNED) constraints.txt
 export OPENBLAS_NUM_THREADS := 1
 
 .PHONY: help venv test test-all test-busy lint types export demo demo-data golden study tradeoff wheel wheel-test \
-  board-test browser-test kernel-test peers-test service-test hard-cases hard-cases-versions mutants fuzz kills accuracy bench transfer shear docs faults risk shifts \
+  board-test browser-test c-test kernel-test peers-test service-test hard-cases hard-cases-versions mutants fuzz kills accuracy bench transfer shear docs faults risk shifts \
   stopping soak measured constraints clean
 
 help:
@@ -20,7 +20,7 @@ help:
 	@echo "  make test-busy     the fast tests five times beside eight busy processes"
 	@echo "  make export        fit a model to DATA (a folder of recordings; default: simulated ones)"
 	@echo "                     and write model.onnx, golden.npz and report.html to OUT (default:"
-	@echo "                     build); NAME=... names the model"
+	@echo "                     build); NAME=... names the model; C=DIR writes it in C99 too"
 	@echo "  make demo          fit a model to a small simulated set and decide on touches new to it"
 	@echo "  make study         the paper's analyses of DATA beside ours: build/study/report.html"
 	@echo "  make tradeoff      what accuracy costs in time: build/tradeoff/report.html; BOARD=board.json"
@@ -31,6 +31,7 @@ help:
 	@echo "  make wheel         build the package that goes on the board: dist/edge_classify-*.whl"
 	@echo "  make wheel-test    test the wheel in an empty environment outside the checkout"
 	@echo "  make board-test    test the wheel on an emulated aarch64"
+	@echo "  make c-test        the model in C beside Python, here and on Cortex-M0+, M4F and M33 (QEMU)"
 	@echo "  make kernel-test   run the commands under a real Linux kernel, over modelled chips"
 	@echo "  make browser-test  use the page and the report in Chromium, and look for what excludes people"
 	@echo "  make peers-test    the kernels beside aeon's MiniRocket"
@@ -140,7 +141,7 @@ endif
 export: $(READY)
 	$(BIN)/python -m export --data $(RECORDINGS) $(BESIDE) --out $(OUT) --report $(FRONTED) \
 	  $(addprefix --name ,$(NAME)) $(addprefix --compare ,$(COMPARE)) $(if $(TEST),--test $(TEST)) \
-	  $(EXPORT)
+	  $(addprefix --c ,$(C)) $(EXPORT)
 
 DEMO := $(OUT)/demo
 
@@ -304,6 +305,9 @@ wheel: $(VENV)/.upkeep
 
 wheel-test: $(DEV) wheel
 	$(BIN)/python -m pytest tests/board/test_wheel.py
+
+c-test: $(DEV)
+	$(BIN)/python -m pytest tests/export/test_c_code.py -rs
 
 kernel-test: $(DEV)
 	$(BIN)/python -m pytest tests/board/test_kernel.py -rs --capture=tee-sys

@@ -8,6 +8,7 @@ import shutil
 from collections.abc import Iterable, Mapping, Sequence
 from itertools import pairwise
 from math import ceil, pi
+from operator import mul
 from pathlib import Path
 from typing import Any
 
@@ -25,11 +26,13 @@ from edge.touch.feature import Feature
 from edge.touch.kernels import BIASES, mixes
 from edge.touch.layout import SkinLayout
 from edge.touch.zones import Zones
-from export.c_graph import CompiledGraph
+from export.c_graph import ELEMENT_WISE, CompiledGraph
 
 ROOMS = Path(__file__).parent / "c"
 RATE_HZ = 120.0
 """Frames a second for which there is room."""
+CODE_BYTES = 16 * 1024
+"""Of all rooms, by gcc 12 with -O2 for a Cortex-M0+."""
 LARGEST = 2**63
 """No product of a frame's sums may reach it."""
 MOST_SUMMED = 128
@@ -93,6 +96,7 @@ def write(
     source.define("POINTS", len(points))
     source.define("ARENA", graph.arena)
     source.array("const double", "ec_windows_s", [float(windows_s[i]) for i in points])
+    source.ram += 8 * graph.arena
     _graph(source, graph)
     _tasks(source, model, graph.places, points, error)
     target = Path(folder)
@@ -104,13 +108,59 @@ def write(
     return source
 
 
+def export(
+    model: Model,
+    folder: str | os.PathLike[str],
+    error: float | None,
+    flash_kb: int | None,
+) -> str:
+    """Write a model's C, and say how large it is, and what was left out for that.
+
+    Args:
+        model: the model.
+        folder: that is made.
+        error: as for `write`.
+        flash_kb: kilobytes that tables and code may take.
+
+    Raises:
+        InputError: as `write`; or it is larger even without early decisions.
+    """
+    left_out = ""
+    source = write(model, folder, error)
+    limit = 1024 * flash_kb if flash_kb else source.flash
+    if source.flash > limit and error is not None:
+        left_out = "; early decisions are left out to fit --flash"
+        source = write(model, folder, None)
+    if source.flash > limit:
+        raise InputError(
+            f"{model.path}: takes {source.flash / 1024:.0f} kB of flash in C, above "
+            "--flash; export fewer features or recordings"
+        )
+    millions = source.work / 1e6
+    return (
+        f"{os.fspath(folder)}: {source.flash / 1024:.0f} kB of flash, "
+        f"{source.ram / 1024:.0f} kB of RAM, a decision in about {millions:.1f} million "
+        f"instructions of a Cortex-M4F ({millions / 0.064:.0f} ms at 64 MHz) or "
+        f"{2.2 * millions:.1f} million of a Cortex-M0+ ({2.2 * millions / 0.133:.0f} ms "
+        f"at 133 MHz){left_out}"
+    )
+
+
 class Source:
-    """Definitions of a model in C."""
+    """Definitions of a model in C.
+
+    Attributes:
+        flash: bytes of code and tables.
+        ram: bytes.
+        work: instructions of a decision on a Cortex-M4F, about.
+    """
 
     def __init__(self) -> None:
         self.defines: dict[str, str] = {}
         self.lines: list[str] = []
-        self.bytes = 0
+        self.flash = CODE_BYTES
+        self.ram = 0
+        self.work = 0
 
     def define(self, name: str, value: object) -> None:
         """A constant of the preprocessor."""
@@ -258,6 +308,10 @@ def _skin(source: Source, info: ModelInfo, frames: int) -> None:
     }
     for name, value in values.items():
         source.define(name, value)
+    counts = len(zones), info.joints, values["CELLS"], values["KERNEL_CELLS"]
+    row = sum(map(mul, (64, 8, 4, 4), map(max, counts, (1, 1, 1, 1)))) + 32
+    source.ram += frames * row + 8 * layout.rows * layout.cols + 2048
+    source.work += 90 * frames * 100 * len(zones) + 3000 * info.width
     source.array("const bool", "ec_alive", layout.alive.reshape(-1))
     source.array(
         "const uint8_t",
@@ -297,7 +351,7 @@ def _graph(source: Source, graph: CompiledGraph) -> None:
         source.array(
             f"static const {C_TYPES[table.kind]}", f"t{i}", table.values.reshape(-1)
         )
-        source.bytes += table.values.nbytes
+        source.flash += table.values.nbytes
         by_point = table.values.ndim - 1
         tables.append([f"t{i}", table.values.shape[-1], table.kind, by_point])
     source.array("const ec_table", "ec_tables", tables)
@@ -306,6 +360,14 @@ def _graph(source: Source, graph: CompiledGraph) -> None:
         for s in graph.steps
     ]
     source.array("const ec_step", "ec_steps", steps)
+    source.flash += 44 * len(steps)
+    for step in graph.steps:
+        first, second, *_ = (*step.sizes, 1)
+        if step.operator == "Gemm":
+            source.work += 12 * first * second
+        else:
+            alone = step.operator in ELEMENT_WISE
+            source.work += 200 * first * (1 if alone else max(second, 1))
 
 
 def _tasks(

@@ -158,6 +158,12 @@ def _add_results(top: argparse.ArgumentParser) -> None:
     option("--report", action="store_true", help=text)
     text = "recordings that are scored and never fitted, such as those of another day"
     option("--test", nargs="+", metavar="REC", help=text)
+    text = "also write the model as C99 for a microcontroller, into this folder"
+    option("--c", type=Path, metavar="DIR", help=text)
+    text = "with --c: decide early, wrongly at most this often (default: at the full window)"
+    option("--c-error", type=float, metavar="RATE", help=text)
+    text = "with --c: kB that it may take; early decisions are left out first"
+    option("--flash", type=count, metavar="KB", help=text)
     text = "a former model.onnx, which is scored on the --test recordings too"
     option("--compare", metavar="old.onnx", help=text)
     option(
@@ -203,6 +209,10 @@ def _written(
     for line in by_folder(fitted, arguments.data):
         print(line, file=sys.stderr)
     print(f"{path} ({size / 1024:.0f} kB)\n{path.with_name('golden.npz')}")
+    if arguments.c:
+        from export.c_code import export
+
+        print(export(Model(path), arguments.c, arguments.c_error, arguments.flash))
     if held_out:
         print(held_out_text(Model(path), former, held_out), file=sys.stderr)
     if arguments.report:

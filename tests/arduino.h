@@ -14,10 +14,18 @@ int analogRead(uint8_t pin);
 void analogReadResolution(int bits);
 #endif
 unsigned long micros();
+unsigned long millis();
+void delay(unsigned long ms);
 void delayMicroseconds(unsigned int us);
 
 struct Stream {
-  void begin(unsigned long);
+  void begin(unsigned long = 0);
+  void setClock(unsigned long);
+  void beginTransmission(uint8_t address);
+  uint8_t endTransmission(bool stop = true);
+  size_t requestFrom(uint8_t address, uint8_t size);
+  size_t print(const char*);
+  size_t println(double, int digits);
   int available();
   int read();
   size_t write(uint8_t);

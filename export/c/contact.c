@@ -16,29 +16,26 @@ bool ec_released(double touched_s, double now_s) {
 
 /* A point of the skin in the frame of its link. */
 static void skin_point(double row, double col, double point[3]) {
-#if EC_CYLINDER
-#if EC_COLUMN_ANGLES
-  uint32_t column = (uint32_t)col;
-  const ec_angle *place = &ec_angles[column % EC_COLS];
-  double angle = (place->angle_deg + (col - column) * place->step_deg) * EC_RADIANS;
-#else
   double angle = EC_TURN * col / EC_COLS;
-#endif
-  point[0] = EC_RADIUS_M * ec_cos(angle);
-  point[1] = EC_RADIUS_M * ec_sin(angle);
-  point[2] = EC_ROW0_Z_M - row * EC_ALONG;
-#else
   point[0] = col * EC_AROUND;
   point[1] = row * EC_ALONG;
   point[2] = 0.0;
-#endif
+  if (!EC_CYLINDER) return;
+  if (EC_COLUMN_ANGLES) {
+    uint32_t column = (uint32_t)col;
+    const ec_angle *place = &ec_angles[column % EC_COLS];
+    angle = (place->angle_deg + (col - column) * place->step_deg) * EC_RADIANS;
+  }
+  point[0] = EC_RADIUS_M * ec_cos(angle);
+  point[1] = EC_RADIUS_M * ec_sin(angle);
+  point[2] = EC_ROW0_Z_M - row * EC_ALONG;
 }
 
-#if EC_DOF
 /* The point in the frame of the arm's base. */
 static void carried(const double *joints, double p[3]) {
   uint32_t moving = EC_DOF;
-  for (const ec_link *link = ec_links + EC_LINKS; link-- > ec_links;) {
+  for (uint32_t number = EC_LINKS; number-- > 0;) {
+    const ec_link *link = &ec_links[number];
     const double *k = link->axis;
     const double *step = link->step;
     for (uint32_t i = 0; i < 3; i++) p[i] = p[i] + link->after[i];
@@ -65,21 +62,16 @@ static void carried(const double *joints, double p[3]) {
     }
   }
 }
-#endif
 
 /* Distance from where this centroid was first seen; not a number without a pose. */
 static double distance(ec_start *start, double row, double col, const double *joints) {
   double p[3];
   skin_point(row, col, p);
-#if EC_DOF
-  if (!joints) {
+  if (EC_DOF && !joints) {
     ec_now.missing_pose = true;
     return EC_NAN;
   }
-  carried(joints, p);
-#else
-  (void)joints;
-#endif
+  if (EC_DOF) carried(joints, p);
   if (!start->known) {
     start->known = true;
     for (uint32_t i = 0; i < 3; i++) start->point[i] = p[i];
@@ -109,22 +101,20 @@ static void move(ec_row *row, bool touched, const double *joints) {
   for (uint32_t i = 0; i < 2; i++) {
     row->motions[i] = !touched && ec_now.rows ? ec_now.row[ec_now.rows - 1].motions[i] : 0.0;
   }
-  if (!touched) return;
-#if EC_MOTION
-  int64_t rows;
-  int64_t cols;
-  ec_sums(&region, &rows, &cols);
-  double area = region.area;
-  row->motions[0] =
-      distance(&ec_now.starts[0], (double)rows / area, (double)cols / area, joints);
-#endif
-#if EC_FORCE_MOTION
-  double force = (double)row->zones[0][2];
-  double col = (double)row->zones[0][4] / force;
-  if (col >= EC_COLS) col -= EC_COLS;
-  row->motions[1] = distance(&ec_now.starts[1], (double)row->zones[0][3] / force, col, joints);
-#endif
-  (void)joints;
+  if (touched && EC_MOTION) {
+    int64_t rows;
+    int64_t cols;
+    ec_sums(&region, &rows, &cols);
+    double area = region.area;
+    row->motions[0] =
+        distance(&ec_now.starts[0], (double)rows / area, (double)cols / area, joints);
+  }
+  if (touched && EC_FORCE_MOTION) {
+    double force = (double)row->zones[0][2];
+    double col = (double)row->zones[0][4] / force;
+    if (col >= EC_COLS) col -= EC_COLS;
+    row->motions[1] = distance(&ec_now.starts[1], (double)row->zones[0][3] / force, col, joints);
+  }
 }
 
 /* The sums of the skin's cells. */
@@ -137,8 +127,8 @@ static void pool(
   }
 }
 
-static int add(const uint16_t *counts, const bool *valid, const double *joints, double age_s,
-               bool touched) {
+static int add(
+    const uint16_t *counts, const bool *valid, const double *joints, double age_s, bool touched) {
   if (ec_now.rows && age_s <= ec_now.age_s) {
     age_s = ec_now.age_s;
     forget_last();
@@ -152,25 +142,17 @@ static int add(const uint16_t *counts, const bool *valid, const double *joints, 
   row->peak = touched ? region.peak : 0;
   row->area = touched ? region.area : 0;
   if (touched) ec_now.region = region;
-#if EC_ZONES
-  for (uint32_t i = 0; i < EC_ZONES; i++) {
+  for (uint32_t i = 0; ec_zone_names[i] != EC_NO_ZONE; i++) {
     for (uint32_t j = 0; j < EC_ZONE_WIDTH; j++) row->zones[i][j] = 0;
     if (touched) ec_zone((ec_zone_name)ec_zone_names[i], active, &region, counts, row->zones[i]);
   }
-#endif
   move(row, touched, joints);
-#if EC_CELLS
-  pool(counts, valid, ec_cell_of_taxel, row->cells, EC_CELLS);
-#endif
-#if EC_KERNEL_CELLS
-  pool(counts, valid, ec_kernel_cell_of_taxel, row->kernel_cells, EC_KERNEL_CELLS);
-#endif
-#if EC_JOINTS
-  for (uint32_t i = 0; i < EC_JOINTS; i++) row->joints[i] = joints ? joints[i] : EC_NAN;
-  if (!joints) ec_now.missing_pose = true;
-#endif
-  (void)pool;
-  (void)counts;
+  if (EC_CELLS) pool(counts, valid, ec_cell_of_taxel, row->cells, EC_CELLS);
+  if (EC_KERNEL_CELLS) {
+    pool(counts, valid, ec_kernel_cell_of_taxel, row->kernel_cells, EC_KERNEL_CELLS);
+  }
+  for (uint32_t i = EC_JOINTS; i-- > 0;) row->joints[i] = joints ? joints[i] : EC_NAN;
+  if (EC_JOINTS && !joints) ec_now.missing_pose = true;
   ec_now.rows++;
   ec_now.age_s = age_s;
   return 0;

@@ -42,7 +42,6 @@ static double margin(const double *distance, int16_t label, uint32_t labels) {
   return distance[label] < EC_INFINITY ? rival - distance[label] : -EC_INFINITY;
 }
 
-#if EC_CALIBRATED
 static double excess(void) {
   double typical = ec_typical[point];
   double score = output(EC_PLACE_NOVELTY);
@@ -55,23 +54,13 @@ static double known(void) {
   if (score <= 0.0) return 1.0;
   return ec_logistic(ec_known_slopes[point] * ec_log(ec_middles[point] / score));
 }
-#endif
 
 /* The calibrated confidence of a label by its curve. */
-static double confidence(const ec_curve *curve, const ec_task *task, const double *distance,
-                         int16_t label) {
-#if EC_CALIBRATED
+static double confidence(
+    const ec_curve *curve, const ec_task *task, const double *distance, int16_t label) {
   double log_odds = curve->slope * margin(distance, label, task->labels);
   log_odds += curve->intercept;
   return ec_logistic(log_odds - curve->doubt * excess());
-#else
-  (void)curve;
-  (void)task;
-  (void)distance;
-  (void)label;
-  (void)margin;
-  return EC_NAN;
-#endif
 }
 
 /* The nearest answer in which a product and its factors agree. */
@@ -116,8 +105,6 @@ static void ask(uint32_t index, uint16_t doubts) {
     ties = votes > most ? 1 : ties + (votes == most);
     if (votes > most) most = votes;
   }
-  double likely = confidence(
-      &task->curves[EC_CALIBRATED ? point : 0], task, distances[index], a->decision_label);
   a->label = a->decision_label;
   a->stopped_by = EC_NOTHING;
   a->nearest = (uint32_t)output(task->neighbours);
@@ -125,13 +112,12 @@ static void ask(uint32_t index, uint16_t doubts) {
   a->flags |= flag(output(task->distances) == 0.0, EC_AS_TRAINED);
   a->flags |= flag(output(EC_PLACE_OUT_OF_RANGE) > 0.0, EC_OUT_OF_RANGE);
   a->flags |= flag(ties > 1, EC_TIE);
-#if EC_CALIBRATED
+  a->confidence = EC_NAN;
+  if (!EC_CALIBRATED) return;
+  double likely = confidence(&task->curves[point], task, distances[index], a->decision_label);
   if (index == EC_NAMING) likely *= known();
   a->confidence = rounded(likely);
   if (index == EC_NAMING && output(EC_PLACE_REMOTENESS) > ec_remote[point]) withhold(a);
-#else
-  a->confidence = likely;
-#endif
 }
 
 /* The model's answers at the decision point. */
@@ -158,16 +144,13 @@ static void ask_all(bool is_short) {
     }
   }
   if (refused) return;
-#if EC_CALIBRATED
-  doubts |= flag(output(EC_PLACE_NOVELTY) > ec_novel[point], EC_UNUSUAL);
-#endif
+  doubts |= flag(EC_CALIBRATED && output(EC_PLACE_NOVELTY) > ec_novel[point], EC_UNUSUAL);
   for (uint32_t i = 0; i < EC_TASKS; i++) {
     answers[i].refused = false;
     ask(i, doubts);
   }
 }
 
-#if EC_EARLY
 /* The answer of the task's rule. */
 static bool stop(answer *a, const ec_task *task, bool sure) {
   if (a->label >= 0 && !sure && task->rule_confidence <= 1.0) a->flags |= EC_UNSURE;
@@ -199,7 +182,7 @@ static bool stop_product(const ec_task *task, answer *a) {
 static bool is_decided(uint32_t index) {
   const ec_task *task = &ec_tasks[index];
   answer *a = &answers[index];
-  if (a->refused) return true;
+  if (!EC_EARLY || a->refused) return true;
   if (!task->has_rule) {
     a->flags |= EC_UNCERTIFIED;
     return point == EC_POINTS - 1;
@@ -212,12 +195,6 @@ static bool is_decided(uint32_t index) {
   if (point < last && (waits || !sure)) return false;
   return stop(a, task, sure);
 }
-#else
-static bool is_decided(uint32_t index) {
-  (void)index;
-  return true;
-}
-#endif
 
 /* Ask at the decision point; the number of events. Factors come before their products. */
 static int decide(ec_event *events, bool is_short) {

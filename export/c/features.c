@@ -43,7 +43,6 @@ static double summed(const double *x, uint32_t n) {
   return sum;
 }
 
-#if EC_ZONES
 /* From 0 on, below a turn. */
 static double on_circle(double col) {
   if (col >= EC_COLS) return col - EC_COLS;
@@ -101,11 +100,8 @@ static void measure(uint32_t index) {
     q[EC_STIFFNESS * EC_FRAMES] =
         (force / EC_SCALE + EC_FORCE_FLOOR) / (felt[i]->motions[1] + EC_LENGTH_FLOOR);
   }
-#if EC_WRAPS
-  unwrap(columns + EC_AROUND_COLS * EC_FRAMES);
-#endif
+  if (EC_WRAPS) unwrap(columns + EC_AROUND_COLS * EC_FRAMES);
 }
-#endif
 
 /* A value of a frame; not a number where it cannot be known. */
 static double value(const ec_feature *feature, uint32_t row, uint32_t frame) {
@@ -199,8 +195,8 @@ static double summary(uint8_t kind, double *x, uint32_t n) {
   return ec_sqrt(summed(x, n) / n) * ec_exp2(half) * ec_exp2(power - half);
 }
 
-/* The values of a feature; the place behind them. */
-static double *block(const ec_feature *feature, double window_s, double *out) {
+/* The values of a feature. */
+static void block(const ec_feature *feature, double window_s, double *out) {
   uint32_t n = feature->samples;
   double step_s = window_s / (n - 1);
   double *x = feature->summary <= EC_RATE ? out : samples;
@@ -212,21 +208,15 @@ static double *block(const ec_feature *feature, double window_s, double *out) {
     if (feature->summary == EC_RATE) to_rate(x, n, step_s);
     if (feature->summary > EC_RATE) *out++ = summary(feature->summary, x, n);
   }
-  return feature->summary <= EC_RATE ? x : out;
 }
 
-#if EC_CONVOLVED
 #define SAMPLES 40
 #define BITS 14
 
 /* A channel, held between frames, times a power of two and cut off. */
 static int32_t channel(const ec_kernels *kernels, const ec_row *row, uint32_t index) {
-#if EC_ZONES
-  int64_t x = kernels == &ec_zone_kernels ? row->zones[index / EC_ZONE_WIDTH][index % EC_ZONE_WIDTH]
-                                          : row->kernel_cells[index];
-#else
-  int64_t x = row->kernel_cells[index];
-#endif
+  int64_t x = row->kernel_cells[kernels == &ec_zone_kernels ? 0 : index];
+  if (kernels == &ec_zone_kernels) x = row->zones[index / EC_ZONE_WIDTH][index % EC_ZONE_WIDTH];
   int8_t shift = kernels->shifts[index];
   if (x > (int64_t)1 << 48) x = (int64_t)1 << 48;
   x = shift > 0 ? x * ((int64_t)1 << shift) : x >> -shift;
@@ -255,7 +245,7 @@ static void next_taps(uint8_t heavy[3]) {
 }
 
 /* The share of the samples at which each kernel's result is above its biases. */
-static double *shares(const ec_kernels *kernels, double window_s, double *out) {
+static void shares(const ec_kernels *kernels, double window_s, double *out) {
   const ec_row *rows[SAMPLES];
   const uint8_t *mix = kernels->mixes;
   const int32_t *bias = kernels->biases;
@@ -283,13 +273,6 @@ static double *shares(const ec_kernels *kernels, double window_s, double *out) {
       }
     }
   }
-  return out;
-}
-#endif
-
-/* Where the values of a feature end. */
-static double *behind(const ec_feature *feature, double *out) {
-  return out + feature->rows * (feature->summary > EC_RATE ? 1u : feature->samples);
 }
 
 /* The features of the window from onset on, at the arena's beginning. */
@@ -298,21 +281,17 @@ void ec_vector(double window_s) {
   for (uint32_t i = 0; i < EC_ZONES + 1; i++) {
     uint8_t zone = ec_zone_names[i];
     double *out = ec_arena;
-#if EC_ZONES
     if (zone != EC_NO_ZONE) measure(i);
-#endif
     for (const ec_feature *feature = ec_features; feature < ec_features + EC_FEATURES; feature++) {
-      double *next = behind(feature, out);
-      if (feature->zone == zone && feature->quantity < EC_TAXEL_KERNELS) {
-        block(feature, window_s, out);
+      uint32_t values = feature->summary > EC_RATE ? 1 : feature->samples;
+      if (feature->zone == zone) {
+        switch (feature->quantity) {
+          case EC_TAXEL_KERNELS: shares(&ec_taxel_kernels, window_s, out); break;
+          case EC_ZONE_KERNELS: shares(&ec_zone_kernels, window_s, out); break;
+          default: block(feature, window_s, out);
+        }
       }
-#if EC_CONVOLVED
-      bool of_zones = feature->quantity == EC_ZONE_KERNELS;
-      if (feature->zone == zone && feature->quantity >= EC_TAXEL_KERNELS) {
-        shares(of_zones ? &ec_zone_kernels : &ec_taxel_kernels, window_s, out);
-      }
-#endif
-      out = next;
+      out += feature->rows * values;
     }
   }
 }

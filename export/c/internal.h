@@ -9,12 +9,12 @@
 
 #include "edge_classify.h"
 
-/* A sum must not be fused with its product, or the bits would be others: compile with
-   -ffp-contract=off. */
-#if defined(__FAST_MATH__)
-#error "compile without -ffast-math: the answers would be others"
+/* A sum that is fused with its product has other bits. gcc knows no pragma against it: where the
+   processor has such an instruction, say that -ffp-contract=off is given. */
+#if defined(__FAST_MATH__) || (defined(__FP_FAST_FMA) && !defined(EC_NO_CONTRACTION))
+#error "compile with -ffp-contract=off -DEC_NO_CONTRACTION and without -ffast-math"
 #endif
-#if defined(FLT_EVAL_METHOD) && FLT_EVAL_METHOD != 0
+#if FLT_EVAL_METHOD != 0
 #error "doubles must be computed as doubles, not in wider registers"
 #endif
 
@@ -116,27 +116,10 @@ extern const int16_t ec_kernel_cell_of_taxel[];
 
 /* model.c: the features */
 enum {
-  EC_MAX_FORCE, /* of a zone */
-  EC_FORCE,
-  EC_AREA,
-  EC_PRESSURE,
-  EC_ALONG_ROWS,
-  EC_AROUND_COLS,
-  EC_SPREAD_ALONG,
-  EC_SPREAD_AROUND,
-  EC_SLANT,
-  EC_LENGTH,
-  EC_WIDTH_OF_ZONE,
-  EC_STIFFNESS,
-  EC_ZONE_QUANTITIES,
-  EC_REGION_PEAK = EC_ZONE_QUANTITIES,
-  EC_REGION_AREA,
-  EC_CENTROID_MOTION,
-  EC_CENTRE_OF_FORCE_MOTION,
-  EC_TAXEL_FORCE,
-  EC_JOINT_ANGLE,
-  EC_JOINT_CHANGE,
-  EC_TAXEL_KERNELS,
+  EC_MAX_FORCE, EC_FORCE, EC_AREA, EC_PRESSURE, EC_ALONG_ROWS, EC_AROUND_COLS, EC_SPREAD_ALONG,
+  EC_SPREAD_AROUND, EC_SLANT, EC_LENGTH, EC_WIDTH_OF_ZONE, EC_STIFFNESS, EC_ZONE_QUANTITIES,
+  EC_REGION_PEAK = EC_ZONE_QUANTITIES, EC_REGION_AREA, EC_CENTROID_MOTION,
+  EC_CENTRE_OF_FORCE_MOTION, EC_TAXEL_FORCE, EC_JOINT_ANGLE, EC_JOINT_CHANGE, EC_TAXEL_KERNELS,
   EC_ZONE_KERNELS
 };
 enum { EC_NO_TRANSFORM, EC_LOG, EC_ROOT, EC_RELATIVE };
@@ -184,25 +167,9 @@ typedef struct {
 } ec_step;
 
 enum {
-  EC_ADD,
-  EC_SUB,
-  EC_MUL,
-  EC_DIV,
-  EC_MAX,
-  EC_LESSOREQUAL,
-  EC_WHERE,
-  EC_CLIP,
-  EC_ROUND,
-  EC_SQRT,
-  EC_GEMM,
-  EC_REDUCEL1,
-  EC_REDUCESUM,
-  EC_REDUCESUMSQUARE,
-  EC_REDUCEMEAN,
-  EC_TOPK,
-  EC_GATHER,
-  EC_PAD,
-  EC_ARGMAX
+  EC_ADD, EC_SUB, EC_MUL, EC_DIV, EC_MAX, EC_LESSOREQUAL, EC_WHERE, EC_CLIP, EC_ROUND, EC_SQRT,
+  EC_GEMM, EC_REDUCEL1, EC_REDUCESUM, EC_REDUCESUMSQUARE, EC_REDUCEMEAN, EC_TOPK, EC_GATHER,
+  EC_PAD, EC_ARGMAX
 };
 
 extern const ec_table ec_tables[];

@@ -16,10 +16,8 @@ static uint32_t neighbours(uint32_t taxel, uint32_t beside[4]) {
   if (row + 1 < EC_ROWS) beside[count++] = taxel + EC_COLS;
   if (col > 0) beside[count++] = taxel - 1;
   if (col + 1 < EC_COLS) beside[count++] = taxel + 1;
-#if EC_WRAPS
-  if (col == 0) beside[count++] = taxel + EC_COLS - 1;
-  if (col + 1 == EC_COLS) beside[count++] = taxel + 1 - EC_COLS;
-#endif
+  if (EC_WRAPS && col == 0) beside[count++] = taxel + EC_COLS - 1;
+  if (EC_WRAPS && col + 1 == EC_COLS) beside[count++] = taxel + 1 - EC_COLS;
   return count;
 }
 
@@ -87,7 +85,6 @@ bool ec_largest(
   return best.area > 0;
 }
 
-#if EC_WRAPS
 /* The column at which to cut a circle so that the weights' variance is least. */
 static uint32_t best_cut(const int64_t weights[EC_COLS]) {
   int64_t total = 0;
@@ -118,7 +115,6 @@ static uint32_t best_cut(const int64_t weights[EC_COLS]) {
   }
   return best;
 }
-#endif
 
 /* Sums of rows and of columns over the region's taxels: area times the centroid. */
 void ec_sums(const ec_region *region, int64_t *rows, int64_t *cols) {
@@ -131,10 +127,8 @@ void ec_sums(const ec_region *region, int64_t *rows, int64_t *cols) {
     *rows += i / EC_COLS;
     *cols += i % EC_COLS;
   }
-#if EC_WRAPS
-  uint32_t cut = best_cut(areas);
+  uint32_t cut = EC_WRAPS ? best_cut(areas) : 0;
   for (uint32_t col = 0; col < cut; col++) *cols += EC_COLS * areas[col];
-#endif
   *cols %= (int64_t)EC_COLS * region->area;
 }
 
@@ -147,13 +141,11 @@ void ec_zone(
   uint32_t begin = zone == EC_RIGHT ? EC_COLS / 2 : 0;
   uint32_t end = zone == EC_LEFT ? EC_COLS / 2 : EC_COLS;
   uint32_t cut = 0;
-#if EC_WRAPS
-  if (zone == EC_CONTACT || zone == EC_SKIN) {
+  if (EC_WRAPS && (zone == EC_CONTACT || zone == EC_SKIN)) {
     int64_t weights[EC_COLS] = {0};
     for (uint32_t i = 0; i < TAXELS; i++) weights[i % EC_COLS] += taxels[i] ? counts[i] : 0;
     cut = best_cut(weights);
   }
-#endif
   for (uint32_t i = 0; i < EC_ZONE_WIDTH; i++) numbers[i] = 0;
   for (uint32_t i = 0; i < TAXELS; i++) {
     uint32_t col = i % EC_COLS;

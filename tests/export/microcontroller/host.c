@@ -33,19 +33,23 @@ static frame next_frame(void) {
   return next;
 }
 
+/* Of a vector that is refused, what follows from its distances may be anything. */
 static void give_outputs(void) {
+  bool refused = false;
+  for (uint32_t i = 0; i < EC_TASKS; i++) refused |= ec_arena[ec_tasks[i].label] < 0.0;
   for (const ec_task *task = ec_tasks; task < ec_tasks + EC_TASKS; task++) {
     give(ec_arena + task->label, 1);
     give(ec_arena + task->scores, task->labels);
+    if (refused) continue;
     give(ec_arena + task->distances, task->k);
     give(ec_arena + task->neighbours, task->k);
     if (task->label_distances) give(ec_arena + task->label_distances, task->labels);
   }
+  if (refused) return;
   give(ec_arena + EC_PLACE_OUT_OF_RANGE, 1);
-#if EC_CALIBRATED
+  if (!EC_CALIBRATED) return;
   give(ec_arena + EC_PLACE_NOVELTY, 1);
   give(ec_arena + EC_PLACE_REMOTENESS, 1);
-#endif
 }
 
 static void give_vectors(uint32_t frames) {

@@ -92,12 +92,11 @@ def about_recording(kind, recording):
 def outputs(model, point, vector):
     """What the graph gives, in the order of `give_outputs`."""
     values = model.run(np.asarray(vector, float)[None], point)
-    names = [
-        f"{task}_{end}"
-        for task in model.info.tasks
-        for end in "label scores distances neighbours label_distances".split()
-    ]
-    names += ["out_of_range", "novelty", "remoteness"]
+    tasks = model.info.tasks
+    refused = min(values[f"{task}_label"] for task in tasks) < 0
+    ends = "label scores distances neighbours label_distances".split()
+    names = [f"{task}_{end}" for task in tasks for end in ends[: 2 if refused else 5]]
+    names += [] if refused else ["out_of_range", "novelty", "remoteness"]
     parts = [values[name].reshape(-1) for name in names if name in values]
     return np.concatenate(parts).astype(float)
 

@@ -1,0 +1,351 @@
+"""A model in C gives the bits of `replay`: on this machine, and on Cortex-M0+, M4F and
+M33 under QEMU."""
+
+import shutil
+import subprocess
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from edge import demo
+from edge.errors import InputError
+from edge.model.model import Model
+from edge.recording import Recording, load
+from edge.touch import measures
+from edge.touch.feature import KERNELS
+from edge.touch.kernels import KernelTable, channels_of
+from edge.touch.layout import SkinLayout
+from export import c_code
+from export.c_graph import CompiledGraph, table_of
+from export.graph import to_onnx
+from tests.conftest import ROOT, ended, export, in_a_row, save_touches, touch
+from tests.edge.model.test_engines import hostile
+from tests.export.microcontroller import machine
+from tests.export.test_graph import fit, hard_set
+from tests.hard_cases.models import describe
+from train.model.pipeline import Choice
+
+needs_gcc = pytest.mark.skipif(shutil.which("gcc") is None, reason="there is no gcc")
+TOOLS = ("arm-none-eabi-gcc", "qemu-system-arm")
+needs_qemu = pytest.mark.skipif(
+    not all(map(shutil.which, TOOLS)), reason=f"there is no {' or no '.join(TOOLS)}"
+)
+
+
+def same(values, expected):
+    """Whether two arrays have the same bits, but for those of what is not a number."""
+    assert values.shape == expected.shape
+    both_nan = np.isnan(values) & np.isnan(expected)
+    return bool(((values == expected) | both_nan).all())
+
+
+def damaged(recording, rng):
+    """A recording with jitter, repeated times, lift-offs, frames that are lost, taxels
+    that cannot be read and poses that are not known."""
+    n = len(recording.t)
+    stays = rng.random(n) < 0.9
+    stays[0] = True
+    t = recording.t + rng.uniform(-0.004, 0.004, n)
+    t[rng.random(n) < 0.05] = np.nan
+    t = np.maximum.accumulate(np.where(np.isnan(t), recording.t[0], t))
+    frames = recording.frames.copy()
+    frames[rng.random(n) < 0.05] = 0
+    joints = recording.joints
+    if joints is not None:
+        joints = np.where(rng.random((n, 1)) < 0.05, np.nan, joints)[stays]
+    valid = rng.random(frames.shape) > 0.01
+    return replace(
+        recording, t=t[stays], frames=frames[stays], joints=joints, valid=valid[stays]
+    )
+
+
+def recordings_for(layout, count, rng):
+    """Noisy touches that wander over a skin, up to the largest counts."""
+    rows, cols = np.indices(layout.shape)
+    recordings = []
+    for _ in range(count):
+        n = int(rng.integers(30, 150))
+        frames = rng.integers(0, layout.threshold_counts + 1, (n, *layout.shape))
+        for _ in range(rng.integers(1, 4)):
+            row, col = rng.uniform(0, layout.shape)
+            force = rng.choice([300, 3000, 60000])
+            begin = int(rng.integers(0, n // 2))
+            for i in range(begin, int(rng.integers(begin + 3, n + 1))):
+                row, col = (row, col) + rng.normal(size=2) * (0.1, 0.4)
+                aside = np.abs(cols - col) % layout.cols
+                around = (
+                    np.minimum(aside, layout.cols - aside) if layout.wraps else aside
+                )
+                frames[i] += (force * np.exp(-((rows - row) ** 2 + around**2))).astype(
+                    int
+                )
+        t = np.arange(n) / 100.0 + rng.uniform(0, 50)
+        joints = 0.05 * rng.normal(size=(n, 5)).cumsum(axis=0)
+        frames = np.minimum(frames, 65535).astype(np.uint16)
+        meta = {"skin": layout.to_dict()}
+        recordings.append(damaged(Recording(t, frames, joints, meta=meta), rng))
+    return recordings
+
+
+def check(model, folder, recordings, vectors=(), error=None, board=None):
+    """Ask C about vectors and recordings, and compare every bit with Python's answer."""
+    c_code.write(model, folder, error)
+    command = machine.compiled(folder, board)
+    last = len(model.decision_points_s) - 1
+    points = [last] if error is None else [*range(last + 1)]
+    questions = []
+    expected = []
+    for i, vector in enumerate(vectors):
+        point = i % len(points)
+        questions.append(machine.about_vector(point, vector))
+        expected.append(machine.outputs(model, points[point], vector))
+    for recording in recordings:
+        kind = machine.VECTORS_OF_RECORDING
+        questions.append(machine.about_recording(kind, recording))
+        expected.append(machine.vectors(model, points, recording))
+    assert same(machine.ask(command, folder, questions), np.concatenate(expected))
+    kind = machine.EVENTS_OF_RECORDING
+    questions = [machine.about_recording(kind, recording) for recording in recordings]
+    rows = machine.ask(command, folder, questions).reshape(-1, 9)
+    ends = np.flatnonzero(rows[:, 0] == -1.0)
+    answers = np.split(rows, ends)[:-1]
+    for answer, recording in zip(answers, recordings, strict=True):
+        events = machine.events(model, recording, error)
+        assert same(ordered(answer[answer[:, 0] >= 0]), ordered(events))
+
+
+def ordered(events):
+    """By contact, kind and task: C decides a contact that has ended before its window
+    does, so its events come in another order, and never short."""
+    events = events.copy()
+    ended = events[events[:, 0] == 1, 1]
+    decided = np.isin(events[:, 1], ended) & (events[:, 0] == 2)
+    events[decided, 6] -= events[decided, 6] % 2
+    return events[np.lexsort((events[:, 2], events[:, 0], events[:, 1]))]
+
+
+@pytest.fixture(scope="module")
+def early(tmp_path_factory):
+    """A model that decides early, of features of every kind, and touches new to it."""
+    folder = tmp_path_factory.mktemp("early")
+    data = save_touches(folder / "data", 15)
+    words = ["--features", "contact", "moments", "joints", "--quick", "--scaling", "IV"]
+    words += ["--decision-points", "0.3,0.6,1.2"]
+    model = Model(export(folder / "out", "--data", data, *words) / "model.onnx")
+    rng = np.random.default_rng(5)
+    touches = [
+        touch(kind=kind, seed=30 + i) for i in range(4) for kind in ("hard", "soft")
+    ]
+    touches.append(in_a_row(touch(seed=50, seconds=0.5), touch(seed=51)))
+    return model, touches + [damaged(recording, rng) for recording in touches]
+
+
+@needs_gcc
+def test_the_demo_has_the_same_bits(tmp_path):
+    model = Model(demo.MODEL)
+    rng = np.random.default_rng(1)
+    touches = [load(path) for path in sorted(demo.FOLDER.glob("*.npz"))]
+    touches += [damaged(recording, rng) for recording in touches * 3]
+    golden = np.load(Path(__file__).parents[1] / "golden" / "demo.npz")["vectors"]
+    near = np.nextafter(golden[:20], np.inf)
+    check(model, tmp_path, touches, [*golden, *near, *hostile(model.info.width, rng)])
+
+
+@pytest.mark.slow
+@needs_gcc
+def test_early_decisions_have_the_same_bits(early, tmp_path):
+    model, touches = early
+    vectors = hostile(model.info.width, np.random.default_rng(2))
+    errors = {s.rules[i].error for s in model.info.stopping.values() for i in (0, -1)}
+    for i, error in enumerate([None, *sorted(errors)]):
+        check(model, tmp_path / str(i), touches, vectors, error)
+
+
+@pytest.mark.slow
+@needs_gcc
+@needs_qemu
+@pytest.mark.parametrize("board", machine.BOARDS)
+def test_a_microcontroller_has_the_same_bits(early, tmp_path, board):
+    model, touches = early
+    error = max(s.rules[-1].error for s in model.info.stopping.values())
+    vectors = hostile(model.info.width, np.random.default_rng(3))
+    check(model, tmp_path, touches[::3], vectors, error, board)
+
+
+RANDOM = [
+    (kind, projection, scaling, k)
+    for projection, scaling, k in (
+        ("pca", "IV", 1),
+        ("lda", "none", 3),
+        ("pca", "I", 6),
+    )
+    for kind in ("plain", "lattice", "duplicates", "outlier", "far")
+][::2]
+
+
+@pytest.mark.slow
+@needs_gcc
+@pytest.mark.parametrize(("kind", "projection", "scaling", "k"), RANDOM)
+def test_a_random_models_graph_has_the_same_bits(
+    tmp_path, kind, projection, scaling, k
+):
+    X, queries = hard_set(kind, np.random.default_rng(k))
+    choices = {"t": Choice(scaling, 6, min(k, len(X)), projection)}
+    path = tmp_path / "model.onnx"
+    path.write_bytes(to_onnx(fit(X, choices), describe(fit(X, choices), samples=8)))
+    vectors = [*queries, *hostile(X.shape[1], np.random.default_rng(6))]
+    check(Model(path), tmp_path / "c", [], vectors)
+
+
+SKINS = [
+    SkinLayout(
+        16, 24, True, 0.0098, 0.0375, -0.1, threshold_counts=40, onset_counts=60
+    ),
+    SkinLayout(10, 9, pitch_m=(0.004, 0.006), threshold_counts=0, release_s=0.11),
+    SkinLayout(
+        7,
+        5,
+        True,
+        0.01,
+        0.02,
+        column_angles_deg=(0.0, 70.0, 150.0, 220.0, 300.0),
+        dead=(3, 7, 20, 34),
+        counts_per_newton=33.3,
+    ),
+    SkinLayout(
+        22, 18, counts_per_newton=100.0, dead=tuple(range(60)), threshold_counts=9
+    ),
+]
+
+
+def spelled(rng):
+    """Names of features of every kind, with transforms and summaries."""
+    names = []
+    for name in measures.names():
+        if name not in KERNELS:
+            signed = measures.feature(name).quantity in measures.SIGNED
+            prefixes = ["", "sqrt_", "relative_"]
+            prefixes += [] if signed else ["log_", "log_relative_", "sqrt_log_"]
+            prefix, second = rng.choice(prefixes, 2)
+            summaries = ["", "_rate", "_mean", "_deviation", "_roughness"]
+            names.append(f"{prefix}{name}{rng.choice(summaries)}@{rng.integers(2, 30)}")
+            names.append(f"{second}{name}{rng.choice(summaries)}")
+    return [*dict.fromkeys(names), *KERNELS]
+
+
+class NoGraph:
+    """In place of the graph of a model with other features."""
+
+    steps = ()
+    tables = ()
+
+    def __init__(self, model, outputs, points, arena):
+        self.arena = arena
+        self.places = {}
+
+
+@pytest.mark.slow
+@needs_gcc
+@pytest.mark.parametrize("skin", range(len(SKINS)))
+def test_every_feature_of_damaged_recordings_has_the_same_bits(
+    tmp_path, monkeypatch, skin
+):
+    rng = np.random.default_rng(skin)
+    layout = SKINS[skin]
+    model = Model(demo.MODEL)
+    tables = {}
+    for name, biases in KERNELS.items():
+        shifts = rng.integers(-12, 8, channels_of(name, layout)).tolist()
+        limits = rng.integers(-9000, 40000, biases).tolist()
+        tables[name] = KernelTable(tuple(shifts), tuple(limits))
+    model.info = replace(
+        model.info,
+        layout=layout,
+        features=tuple(spelled(rng)),
+        samples=int(rng.choice([2, 7, 8, 17, 40, 128])),
+        chain=model.info.chain if layout.wraps else None,
+        joints=5,
+        kernels=tables,
+        debounce=int(rng.integers(1, 4)),
+    )
+    monkeypatch.setattr(c_code, "CompiledGraph", NoGraph)
+    c_code.write(model, tmp_path, frames=300)
+    command = machine.compiled(tmp_path)
+    recordings = recordings_for(layout, 25, rng)
+    kind = machine.VECTORS_OF_RECORDING
+    questions = [machine.about_recording(kind, recording) for recording in recordings]
+    expected = [machine.vectors(model, [0], recording) for recording in recordings]
+    assert same(machine.ask(command, tmp_path, questions), np.concatenate(expected))
+
+
+@needs_gcc
+@pytest.mark.skipif(shutil.which("g++") is None, reason="there is no C++ compiler")
+def test_the_sketch_suits_the_header(tmp_path, monkeypatch):
+    """Checked against the declarations of Arduino's core."""
+    model = Model(demo.MODEL)
+    model.info = replace(model.info, layout=SkinLayout(1, 12))
+    monkeypatch.setattr(c_code, "CompiledGraph", NoGraph)
+    c_code.write(model, tmp_path)
+    shutil.copy(ROOT / "tests" / "arduino.h", tmp_path / "Wire.h")
+    sketch = ROOT / "docs" / "examples" / "firmware" / "decide" / "decide.ino"
+    command = ["g++", "-std=c++11", "-Wall", "-fsyntax-only", f"-I{tmp_path}", "-xc++"]
+    compiled = ended(*command, sketch)
+    assert compiled.returncode == 0, compiled.stderr
+
+
+@needs_gcc
+def test_options_that_change_bits_do_not_compile(tmp_path):
+    c_code.write(Model(demo.MODEL), tmp_path)
+    for option in ("-ffast-math", "-mfma"):
+        words = ["gcc", option, "-c", "graph.c", "-o", "graph.o"]
+        ended = subprocess.run(words, cwd=tmp_path, capture_output=True, check=False)
+        assert b"#error" in ended.stderr
+
+
+def test_what_c_lacks_is_one_sentence(tmp_path):
+    info = Model(demo.MODEL).info
+    for change, sentence in (
+        ({"layout": replace(info.layout, axes=3)}, "it takes no shear"),
+        ({"layout": replace(info.layout, rows=200)}, "the sums of 200 x 24 taxels"),
+        ({"features": ("max_force_mean@200",)}, "more than 128 samples"),
+    ):
+        assert sentence in " ".join(c_code.lacks(replace(info, **change)))
+    model = Model(demo.MODEL)
+    model.info = replace(info, layout=replace(info.layout, axes=3))
+    with pytest.raises(
+        InputError, match="cannot be written in C, as it takes no shear"
+    ):
+        c_code.write(model, tmp_path)
+
+
+def test_early_decisions_are_left_out_to_fit_the_flash_and_said(early, tmp_path):
+    model, _ = early
+    error = model.info.stopping["object"].rules[-1].error
+    whole = c_code.write(model, tmp_path, error).flash
+    text = c_code.export(model, tmp_path, error, whole // 1024 - 1)
+    assert text.endswith("early decisions are left out to fit --flash")
+    with pytest.raises(InputError, match="kB of flash in C, above --flash"):
+        c_code.export(model, tmp_path, None, 20)
+
+
+def test_a_table_takes_the_smallest_type_that_holds_it():
+    for values, kind in (
+        ([0.0, -128.0], "EC_INT8"),
+        ([128.0], "EC_INT16"),
+        ([-32769.0], "EC_INT32"),
+        ([0.5, np.inf], "EC_FLOAT"),
+        ([0.1], "EC_DOUBLE"),
+    ):
+        table = table_of(np.array(values))
+        assert table.kind == kind
+        assert table.values.tolist() == values
+
+
+def test_the_arena_is_shared_by_values_that_do_not_meet():
+    model = Model(demo.MODEL)
+    graph = CompiledGraph(model, list(model.outputs), [0], 0)
+    values = sum(len(step.outputs) * step.sizes[0] for step in graph.steps)
+    assert graph.arena < values / 3
+    assert graph.places["object_label"] < graph.arena
