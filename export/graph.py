@@ -24,7 +24,13 @@ from edge.model import onnx_file
 from edge.model.info import METADATA_KEY, ModelInfo
 from edge.model.metadata import to_json
 from export.build import OPSET, Builder, project, widened
-from train.model.novelty import CLIP, FARTHEST, STEP_BITS, NoveltySpace
+from train.model.novelty import (
+    CLIP,
+    FARTHEST,
+    STEP_BITS,
+    NoveltyPoint,
+    NoveltySpace,
+)
 from train.model.pipeline import ContactClassifier, FittedSpace, nearest_of_label
 from train.model.stopping import SequentialClassifier
 
@@ -260,6 +266,17 @@ def _doubt(
     units = build.by_decision_point([p.unit for p in points])
     score = build.node("Mul", product, units)
     build.node("Squeeze", score, [1], output=names["novelty"])
+    _remoteness(build, y, columns, points, names["remoteness"])
+
+
+def _remoteness(
+    build: Builder,
+    y: str,
+    columns: str,
+    points: Sequence[NoveltyPoint],
+    output: str,
+) -> None:
+    """Nodes from whitened coordinates y (n, c) to the remoteness."""
     weights = build.by_decision_point([p.weights for p in points])
     weighted = build.node("Mul", y, weights)
     # The rows are stored once: their weights stand beside those of y.
@@ -268,7 +285,7 @@ def _doubt(
     squares = _apart(build, "remoteness", weighted, factor, columns, rows)
     nearness = build.by_decision_point_small([p.nearness for p in points])
     root = _nearest(build, build.node("Mul", squares, nearness))
-    build.node("Squeeze", root, [1], output=names["remoteness"])
+    build.node("Squeeze", root, [1], output=output)
 
 
 def _apart(
