@@ -172,9 +172,8 @@ def candidates(
     paper's three features are tried with more scalings and numbers where you ask for
     these features only. Beside other candidates the best of so many settings would win
     by chance. Methods II and III are left out, as Method I and no scaling have the same
-    neighbours. The discriminants of all tasks side by side tell known things best, so
-    they are tried where no group is left out. Where `kinds_of` names kinds (`drawn`)
-    only what carries over to other skins and arms is tried.
+    neighbours. Where `kinds_of` names kinds (`drawn`) only what carries over to other
+    skins and arms is tried.
     """
     mode = Mode.drawn(joints) if drawn else Mode.usual(joints, shear, quick)
     mode = mode.asked(fixed)
