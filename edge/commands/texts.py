@@ -116,7 +116,7 @@ def _aside(line: Line) -> str:
         return _at(line["t"], "all taxels are followed again")
     places = ", ".join(f"({row}, {col})" for row, col in taxels[:MOST_PLACES])
     more = " ..." if len(taxels) > MOST_PLACES else ""
-    remedy = "free them, or put broken ones into `dead` of the skin file"
+    remedy = "free them, or list broken ones under dead in [signal]"
     return _at(line["t"], f"ignored: taxels {places}{more}; {remedy}")
 
 
