@@ -13,7 +13,7 @@ from edge.statistics import wilson
 from train.choose.candidates import candidates, features_of
 from train.choose.choose import Choosing, decided_together
 from train.choose.evaluate import AnswerTable, Promise
-from train.choose.protocols import GroupsLeftOut, TrialsLeftOut
+from train.choose.protocols import GroupsLeftOut, TrialsLeftOut, rule_among
 from train.choose.settings import Chosen
 from train.data.dataset import Measurement, load_trials
 from train.data.feature_sets import expand
@@ -107,6 +107,16 @@ def test_settings_of_groups_are_chosen_by_left_out_groups_also_without_a_fold(se
         "accuracy": 1.0,
         "by trial": 0.0,
     }
+
+
+def test_among_few_trials_the_most_accurate_is_chosen_whatever_its_price():
+    choices = [Choice("IV", count, 1, "pca", features=TWO) for count in (1, 9)]
+    choices[0] = replace(choices[0], features=TWO[:1])
+    right = np.ones((2, 40), dtype=bool)
+    right[0, :2] = right[1, 2] = False
+    widths = dict.fromkeys(TWO, 3)
+    assert rule_among(choices, widths).choose(right) == 0
+    assert rule_among(choices, widths, is_few=True).choose(right) == 1
 
 
 @pytest.fixture(scope="module")
