@@ -79,7 +79,7 @@ def test_among_few_trials_the_most_accurate_is_chosen_whatever_its_price():
     choices = [Choice("IV", count, 1, "pca", features=TWO) for count in (1, 9)]
     choices[0] = replace(choices[0], features=TWO[:1])
     right = np.ones((2, 40), dtype=bool)
-    right[0, 0] = False
+    right[0, :2] = right[1, 2] = False
     widths = dict.fromkeys(TWO, 3)
     assert rule_among(choices, widths).choose(right) == 0
     assert rule_among(choices, widths, is_few=True).choose(right) == 1
