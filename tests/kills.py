@@ -294,7 +294,7 @@ def killed_once(victim, most_changes, delay_s):
         left = temporaries(folder)
         complaint = damage(folder)
         second_run = ended(*command, timeout=PATIENCE_S)
-        if second_run.returncode and not (alive and victim.refuses):
+        if second_run.returncode and not victim.refuses:
             complaint += second_run.stderr
         complaint += victim.finished(folder, second_run.stderr)
         remaining = [path for path in left if path.exists()]

@@ -55,9 +55,10 @@ def test_features_far_outside_of_training_flag_the_decision_or_give_no_label(
     labelled,
 ):
     recording = make_touch(kind="soft", seed=99)
-    skin = {**recording.meta["skin"], "counts_per_newton": scale}
-    strong = replace(recording, meta={**recording.meta, "skin": skin})
-    events = decided(model, strong)
+    layout = replace(recording.layout, counts_per_newton=scale)
+    classifier = Classifier(model, layout)
+    events = [event for frame in recording for event in classifier.push(frame)]
+    events = [event for event in events if isinstance(event, Decided)]
     assert [e.flags for e in events] == [("out_of_range",)] * 2
     assert [bool(e.label) for e in events] == [labelled] * 2
     assert [bool(e.decision) for e in events] == [labelled] * 2

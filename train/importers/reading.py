@@ -395,10 +395,12 @@ def _named(table: pd.DataFrame, header: _Header) -> pd.DataFrame:
     """The columns by their names, without those that have neither a name nor a
     value."""
     # Without a header, a sign at the ends of the rows makes an empty column.
-    last = len(header.names) - 1
-    named = [i for i in table if header.names[i] and (header.named or i < last)]
-    filled = [i for i in table if i in named or table[i].notna().any()]
-    return table[filled].set_axis([header.unique[i] for i in filled], axis=1)
+    last = len(header.names) - (not header.named)
+    filled = [
+        i for i in table if (header.names[i] and i < last) or table[i].notna().any()
+    ]
+    unique = header.unique
+    return table[filled].set_axis([unique[i] for i in filled], axis=1)
 
 
 def _unpacked(suffix: str, data: bytes) -> bytes:
