@@ -7,8 +7,7 @@ import os
 import shutil
 from collections.abc import Iterable, Mapping, Sequence
 from itertools import pairwise
-from math import ceil, pi
-from operator import mul
+from math import ceil, prod
 from pathlib import Path
 from typing import Any
 
@@ -17,16 +16,16 @@ import numpy as np
 from edge.arrays import Array
 from edge.early import stopping_rules
 from edge.errors import InputError
-from edge.model.info import ModelInfo
+from edge.model.info import ModelInfo, StoppingRule
 from edge.model.model import Model
 from edge.touch import measures, transforms
 from edge.touch.cells import KERNEL_CELLS, Cells
 from edge.touch.contact import feature_types
 from edge.touch.feature import Feature
-from edge.touch.kernels import BIASES, mixes
+from edge.touch.kernels import BIASES, KernelTable, mixes
 from edge.touch.layout import SkinLayout
 from edge.touch.zones import Zones
-from export.c_graph import ELEMENT_WISE, CompiledGraph
+from export.c_graph import CompiledGraph
 
 ROOMS = Path(__file__).parent / "c"
 RATE_HZ = 120.0
@@ -51,13 +50,17 @@ QUANTITIES = {
 """{(zone, quantity): its name in C}, but for those that a zone's sums make."""
 OF_ZONES = {"along": "ALONG_ROWS", "around": "AROUND_COLS", "width": "WIDTH_OF_ZONE"}
 ROOTS = {"sqrt": "ROOT", "": "COURSE"}
-C_TYPES = {
+TYPES_IN_C = {
     "EC_INT8": "int8_t",
     "EC_INT16": "int16_t",
     "EC_INT32": "int32_t",
     "EC_FLOAT": "float",
     "EC_DOUBLE": "double",
 }
+ENDS = "label scores distances neighbours label_distances".split()
+OF_LAYOUT = "rows cols wraps threshold_counts onset release_s radius_m row0_z_m".split()
+OF_INFO = "debounce window_s width joints dof".split()
+"""Attributes that are constants of the preprocessor, by their names."""
 
 
 def write(
@@ -85,20 +88,22 @@ def write(
     for reason in lacks(model.info):
         raise InputError(f"{model.path}: cannot be written in C, as {reason}")
     frames = frames or ceil(model.info.window_s * RATE_HZ) + 4
+    last = len(model.decision_points_s) - 1
+    points = [last] if error is None else [*range(last + 1)]
     source = Source()
     scratch = _features(source, model.info, frames)
-    windows_s = model.decision_points_s
-    points = range(len(windows_s)) if error is not None else [len(windows_s) - 1]
-    graph = CompiledGraph(
-        model, list(model.outputs), points, arena=model.info.width + scratch
-    )
-    _skin(source, model.info, frames)
-    source.define("POINTS", len(points))
+    least = model.info.width + scratch
+    graph = CompiledGraph(model, list(model.outputs), points, least)
+    source.ram = 8 * graph.arena
     source.define("ARENA", graph.arena)
-    source.array("const double", "ec_windows_s", [float(windows_s[i]) for i in points])
-    source.ram += 8 * graph.arena
+    _skin(source, model.info, frames)
     _graph(source, graph)
-    _tasks(source, model, graph.places, points, error)
+    windows_s = [model.decision_points_s[point] for point in points]
+    source.define("POINTS", len(points))
+    source.array("const double", "ec_windows_s", floats(windows_s))
+    rules = {} if error is None else stopping_rules(model, error)
+    _tasks(source, model.info, graph.places, rules)
+    _calibration(source, model.info, points, early=error is not None)
     target = Path(folder)
     target.mkdir(parents=True, exist_ok=True)
     for file in ROOMS.iterdir():
@@ -161,6 +166,7 @@ class Source:
         self.flash = CODE_BYTES
         self.ram = 0
         self.work = 0
+        self.tasks: list[Any] = []
 
     def define(self, name: str, value: object) -> None:
         """A constant of the preprocessor."""
@@ -187,16 +193,13 @@ def literal(value: object) -> str:
     """A value in C: hexadecimal floats hold every bit."""
     if isinstance(value, str):
         return value
-    if isinstance(value, bool | np.bool_):
-        return "true" if value else "false"
     if isinstance(value, float | np.floating):
-        suffix = "f" if isinstance(value, np.float32) else ""
-        number = "INFINITY" if np.isinf(value) else float(value).hex() + suffix
-        return f"(double){number}" if number == "INFINITY" and not suffix else number
-    if isinstance(value, int | np.integer):
-        return str(value)
-    assert isinstance(value, Iterable)
-    return f"{{{', '.join(map(literal, value))}}}"
+        if np.isinf(value):
+            return "(double)INFINITY"
+        return float(value).hex() + "f" * isinstance(value, np.float32)
+    if isinstance(value, Iterable):
+        return f"{{{', '.join(map(literal, value))}}}"
+    return str(int(value))  # type: ignore[call-overload]
 
 
 def lacks(info: ModelInfo) -> Iterable[str]:
@@ -228,23 +231,16 @@ def _features(source: Source, info: ModelInfo, frames: int) -> int:
         rows.append(_feature(feature, layout, samples, count))
     source.define("FEATURES", len(rows))
     source.array("const ec_feature", "ec_features", rows)
-    convolved = [
-        name for name in ("taxel_kernels", "zone_kernels") if name in info.kernels
-    ]
-    source.define("CONVOLVED", len(convolved))
-    for name in convolved:
-        table = info.kernels[name]
+    for name in ("taxel_kernels", "zone_kernels"):
+        table = info.kernels.get(name, KernelTable((), ()))
+        mixed = mixes(len(table.shifts)) if table.shifts else ()
+        indices = [np.flatnonzero(mix).tolist() for mix in mixed]
+        flat = [number for mix in indices for number in (len(mix), *mix)]
         source.array("static const int8_t", f"shifts_of_{name}", table.shifts)
         source.array("static const int32_t", f"biases_of_{name}", table.biases)
-        indices = [np.flatnonzero(mix) for mix in mixes(len(table.shifts))]
-        mixed = [number for mix in indices for number in (len(mix), *mix.tolist())]
-        source.array("static const uint8_t", f"mixes_of_{name}", mixed)
-    for name in ("taxel_kernels", "zone_kernels"):
-        fields = ["0", "0", "0", 0, [0] * 4]
-        if name in info.kernels:
-            fields = [f"{part}_of_{name}" for part in ("shifts", "biases", "mixes")]
-            table = info.kernels[name]
-            fields += [len(table.shifts), BIASES[len(table.biases)]]
+        source.array("static const uint8_t", f"mixes_of_{name}", flat)
+        parts = [f"{part}_of_{name}" for part in ("shifts", "biases", "mixes")]
+        fields = [*parts, len(table.shifts), BIASES.get(len(table.biases), (0,))]
         source.lines.append(f"const ec_kernels ec_{name} = {literal(fields)};")
     return largest + (len(measures.QUANTITIES) + 4) * frames
 
@@ -273,65 +269,45 @@ def _skin(source: Source, info: ModelInfo, frames: int) -> None:
     zones = Zones(layout, types).names
     cells = Cells(layout)
     kernel_cells = Cells(layout, KERNEL_CELLS)
-    along, around = layout.pitch
-    values: dict[str, object] = {
-        "ROWS": layout.rows,
-        "COLS": layout.cols,
-        "WRAPS": int(layout.wraps),
-        "THRESHOLD": layout.threshold_counts,
-        "ONSET": layout.onset,
-        "DEBOUNCE": info.debounce,
-        "RELEASE_S": float(layout.release_s),
-        "WINDOW_S": float(info.window_s),
+    links = () if info.chain is None else info.chain.links
+    angles = layout.column_angles_deg or (0.0,)
+    counts = {
+        "ZONES": len(zones),
+        "CELLS": cells.count * ("taxel_force" in quantities),
+        "KERNEL_CELLS": kernel_cells.count * ("taxel_kernels" in quantities),
+        "FRAMES": frames,
+        "LINKS": len(links),
+        "MOTION": "motion" in quantities,
+        "FORCE_MOTION": not quantities.isdisjoint(("force_motion", "stiffness")),
+        "COLUMN_ANGLES": len(angles) > 1,
         "SCALE": float(layout.counts_per_newton or 1.0),
-        "ALONG": float(along),
-        "AROUND": float(around),
-        "CYLINDER": int(layout.radius_m is not None),
-        "RADIUS_M": float(layout.radius_m or 0.0),
-        "ROW0_Z_M": float(layout.row0_z_m),
-        "TURN": 2.0 * pi,
-        "RADIANS": pi / 180.0,
-        "COLUMN_ANGLES": int(layout.column_angles_deg is not None),
+        "ALONG": float(layout.pitch[0]),
+        "AROUND": float(layout.pitch[1]),
         "FORCE_FLOOR": float(transforms.force_floor(layout)),
         "LENGTH_FLOOR": float(transforms.length_floor(layout)),
-        "FRAMES": frames,
-        "MOTION": int("motion" in quantities),
-        "FORCE_MOTION": int(not quantities.isdisjoint(("force_motion", "stiffness"))),
-        "ZONES": len(zones),
-        "CELLS": cells.count if "taxel_force" in quantities else 0,
-        "KERNEL_CELLS": kernel_cells.count if "taxel_kernels" in quantities else 0,
-        "JOINTS": info.joints,
-        "DOF": info.chain.dof if info.chain else 0,
-        "LINKS": len(info.chain.links) if info.chain else 0,
-        "WIDTH": info.width,
-        "ANGLES": info.dof or 0,
     }
-    for name, value in values.items():
+    for owner, names in ((layout, OF_LAYOUT), (info, OF_INFO)):
+        counts |= {name.upper(): getattr(owner, name) or 0 for name in names}
+    for name, value in counts.items():
         source.define(name, value)
-    counts = len(zones), info.joints, values["CELLS"], values["KERNEL_CELLS"]
-    row = sum(map(mul, (64, 8, 4, 4), map(max, counts, (1, 1, 1, 1)))) + 32
-    source.ram += frames * row + 8 * layout.rows * layout.cols + 2048
-    source.work += 90 * frames * 100 * len(zones) + 3000 * info.width
+    row = 56 + 64 * len(zones) + 8 * info.joints
+    row += 4 * (counts["CELLS"] + counts["KERNEL_CELLS"])
+    source.ram += frames * row + 8 * layout.alive.size + 2048
+    source.work += 9000 * frames * len(zones) + 4000 * info.width
     source.array("const bool", "ec_alive", layout.alive.reshape(-1))
-    source.array(
-        "const uint8_t",
-        "ec_zone_names",
-        [f"EC_{z.upper()}" for z in (*zones, "no_zone")],
-    )
-    source.array("const int16_t", "ec_cell_of_taxel", _of_taxels(layout, cells))
-    source.array(
-        "const int16_t", "ec_kernel_cell_of_taxel", _of_taxels(layout, kernel_cells)
-    )
-    angles = layout.column_angles_deg or (0.0,)
+    zone_names = [f"EC_{name.upper()}" for name in (*zones, "no_zone")]
+    source.array("const uint8_t", "ec_zone_names", zone_names)
+    for name, pooled in (("", cells), ("kernel_", kernel_cells)):
+        numbers = _of_taxels(layout, pooled)
+        source.array("const int16_t", f"ec_{name}cell_of_taxel", numbers)
     steps = [(b - a + 180.0) % 360.0 - 180.0 for a, b in pairwise([*angles, angles[0]])]
     source.array("const ec_angle", "ec_angles", zip(angles, steps, strict=True))
-    links = [] if info.chain is None else info.chain.links
     kinds = {"fixed": "EC_FIXED", "prismatic": "EC_PRISMATIC"}
     rows = [
-        [axis, [x for row in step for x in row], after, kinds.get(kind, "EC_REVOLUTE")]
+        [axis, np.ravel(step), after, kinds.get(kind, "EC_REVOLUTE")]
         for kind, axis, step, after in links
     ]
-    source.array("const ec_link", "ec_links", rows or ["{{0}, {0}, {0}, 0}"])
+    source.array("const ec_link", "ec_links", floats(rows) or ["{{0}, {0}, {0}, 0}"])
 
 
 def _of_taxels(layout: SkinLayout, cells: Cells) -> Array:
@@ -345,122 +321,113 @@ def _of_taxels(layout: SkinLayout, cells: Cells) -> Array:
 
 def _graph(source: Source, graph: CompiledGraph) -> None:
     """The steps and the tables of the graph."""
-    source.define("STEPS", len(graph.steps))
     tables = []
     for i, table in enumerate(graph.tables):
-        source.array(
-            f"static const {C_TYPES[table.kind]}", f"t{i}", table.values.reshape(-1)
-        )
+        numbers = table.values.reshape(-1)
+        source.array(f"static const {TYPES_IN_C[table.kind]}", f"t{i}", numbers)
         source.flash += table.values.nbytes
         by_point = table.values.ndim - 1
         tables.append([f"t{i}", table.values.shape[-1], table.kind, by_point])
-    source.array("const ec_table", "ec_tables", tables)
-    steps = [
-        [f"EC_{s.operator.upper()}", s.points, s.inputs, s.outputs, s.sizes]
-        for s in graph.steps
-    ]
-    source.array("const ec_step", "ec_steps", steps)
+    steps = []
+    for s in graph.steps:
+        steps.append(
+            [f"EC_{s.operator.upper()}", s.points, s.inputs, s.outputs, s.sizes]
+        )
+        is_product = s.operator == "Gemm"
+        source.work += 12 * prod(s.sizes[:2]) if is_product else 250 * max(s.sizes)
     source.flash += 44 * len(steps)
-    for step in graph.steps:
-        first, second, *_ = (*step.sizes, 1)
-        if step.operator == "Gemm":
-            source.work += 12 * first * second
-        else:
-            alone = step.operator in ELEMENT_WISE
-            source.work += 200 * first * (1 if alone else max(second, 1))
+    source.define("STEPS", len(steps))
+    source.array("const ec_table", "ec_tables", tables)
+    source.array("const ec_step", "ec_steps", steps)
 
 
 def _tasks(
     source: Source,
-    model: Model,
+    info: ModelInfo,
     places: Mapping[str, int],
-    points: Sequence[int],
-    error: float | None,
+    rules: Mapping[str, StoppingRule | None],
 ) -> None:
-    """The tasks, their labels and their calibration."""
-    info = model.info
+    """The tasks, their labels and their rules."""
     names = list(info.tasks)
-    rules = {} if error is None else stopping_rules(model, error)
-    source.define("TASKS", len(names))
-    source.define("MOST_LABELS", max(len(task.labels) for task in info.tasks.values()))
-    source.define("CALIBRATED", int(info.novelty is not None))
-    source.define("EARLY", int(error is not None))
-    for output in ("out_of_range", "novelty", "remoteness"):
-        source.define(f"PLACE_{output.upper()}", places.get(output, 0))
-    rows: list[list[object]] = []
-    for name, task in info.tasks.items():
-        stopping = info.stopping.get(name)
-        curves: list[tuple[float, ...]] = [(0.0, 0.0, 0.0)]
-        whole = curves[0]
-        if stopping is not None:
-            of_points = stopping.slopes, stopping.intercepts, stopping.doubts
-            curves = [tuple(column[i] for column in of_points) for i in points]
-            whole = stopping.slope, stopping.intercept, stopping.doubt
-        source.array("static const ec_curve", f"curves_of_{len(rows)}", floats(curves))
-        factors = list(task.factors.items())
-        for i in range(2):
-            indices = factors[i][1] if factors else []
-            source.array("static const uint8_t", f"indices_{i}_of_{len(rows)}", indices)
-        rule = rules.get(name)
-        of_rule = (0.0, 0) if rule is None else (float(rule.confidence), rule.last)
-        ends = "label scores distances neighbours label_distances".split()
-        rows.append(
-            [
-                f"curves_of_{len(rows)}",
-                floats(whole),
-                of_rule[0],
-                [f"indices_{i}_of_{len(rows)}" for i in range(2)],
-                *(places.get(f"{name}_{end}", 0) for end in ends),
-                len(task.labels),
-                task.k,
-                [names.index(factor) for factor, _ in factors] or [0, 0],
-                of_rule[1],
-                rule is not None,
-                bool(factors),
-            ]
-        )
-    source.array("const ec_task", "ec_tasks", rows)
-    order = sorted(range(len(names)), key=lambda i: bool(info.tasks[names[i]].factors))
-    source.array("const uint8_t", "ec_order", order)
-    _labels(source, info)
-    _doubts(source, info, points)
-
-
-def _labels(source: Source, info: ModelInfo) -> None:
-    """The names of tasks and labels."""
-    for i, task in enumerate(info.tasks.values()):
+    rows = []
+    for i, (name, task) in enumerate(info.tasks.items()):
+        factors = list(task.factors) or names[:1] * 2
+        for j, factor in enumerate(factors):
+            indices = task.factors.get(factor, ())
+            source.array("static const uint8_t", f"indices_{j}_of_{i}", indices)
         labels = map(quoted, task.labels)
         source.array("static const char *const", f"labels_of_{i}", labels)
-    lists = [f"labels_of_{i}" for i in range(len(info.tasks))]
+        rule = rules.get(name)
+        stopping = info.stopping.get(name)
+        whole = stopping and (stopping.slope, stopping.intercept, stopping.doubt)
+        rows.append(
+            [
+                f"curves_of_{i}",
+                floats(whole or (0, 0, 0)),
+                float(rule.confidence if rule else 0.0),
+                [f"indices_{j}_of_{i}" for j in range(2)],
+                *(places.get(f"{name}_{end}", 0) for end in ENDS),
+                len(task.labels),
+                task.k,
+                map(names.index, factors),
+                rule.last if rule else 0,
+                rule is not None,
+                bool(task.factors),
+            ]
+        )
+    most = max(len(task.labels) for task in info.tasks.values())
+    source.define("TASKS", len(names))
+    source.define("MOST_LABELS", most)
+    for output in ("out_of_range", "novelty", "remoteness"):
+        source.define(f"PLACE_{output.upper()}", places.get(output, 0))
+    order = sorted(range(len(names)), key=lambda i: bool(info.tasks[names[i]].factors))
+    source.array("const uint8_t", "ec_order", order)
+    lists = [f"labels_of_{i}" for i in range(len(names))]
     source.array("const char *const *const", "ec_labels", lists)
-    source.array("const char *const", "ec_task_names", map(quoted, info.tasks))
+    source.array("const char *const", "ec_task_names", map(quoted, names))
+    source.tasks = rows
 
 
-def _doubts(source: Source, info: ModelInfo, points: Sequence[int]) -> None:
-    """The limits of novelty and remoteness at the decision points."""
-    novelty = info.novelty
-    naming = [name for name, s in info.stopping.items() if s.remoteness is not None]
-    remoteness = info.stopping[naming[0]].remoteness if naming else None
-    source.define("NAMING", [*info.tasks].index(naming[0]) if naming else 255)
-    for name, table in (
-        ("typical", novelty and novelty.typical),
-        ("novel", novelty and novelty.limits),
-        ("remote", remoteness and remoteness.limits),
-        ("middles", remoteness and remoteness.middles),
-        ("known_slopes", remoteness and remoteness.slopes),
-    ):
-        values = [float(table[i]) for i in points] if table else []
-        source.array("const double", f"ec_{name}", values)
+def _calibration(
+    source: Source,
+    info: ModelInfo,
+    points: Sequence[int],
+    *,
+    early: bool,
+) -> None:
+    """The curves and limits at the decision points, and with them the tasks."""
+    naming = 255
+    limits: dict[str, Sequence[float]] = {}
+    if info.novelty is not None:
+        limits |= {"typical": info.novelty.typical, "novel": info.novelty.limits}
+    for i, name in enumerate(info.tasks):
+        stopping = info.stopping.get(name)
+        columns = stopping and (stopping.slopes, stopping.intercepts, stopping.doubts)
+        curves = [[column[point] for column in columns or ()] for point in points]
+        source.array("static const ec_curve", f"curves_of_{i}", floats(curves))
+        remoteness = stopping and stopping.remoteness
+        if remoteness:
+            naming = i
+            limits |= {"remote": remoteness.limits, "middles": remoteness.middles}
+            limits["known_slopes"] = remoteness.slopes
+    for name in ("typical", "novel", "remote", "middles", "known_slopes"):
+        values = [limits[name][point] for point in points if name in limits]
+        source.array("const double", f"ec_{name}", floats(values))
+    source.define("NAMING", naming)
+    source.define("CALIBRATED", info.novelty is not None)
+    source.define("EARLY", early)
+    source.array("const ec_task", "ec_tasks", source.tasks)
 
 
 def quoted(text: str) -> str:
-    """A text as a literal of C; what is not ASCII, as the bytes of UTF-8."""
-    codes = (f"\\{byte:03o}" for byte in text.encode())
-    return '"' + "".join(codes) + '"'
+    """A text as a literal of C: the bytes of UTF-8."""
+    return '"' + "".join(f"\\{byte:03o}" for byte in text.encode()) + '"'
 
 
 def floats(values: Any) -> Any:
-    """Nested numbers as floats."""
-    if isinstance(values, Sequence):
+    """Nested numbers as floats; texts stay."""
+    if isinstance(values, str):
+        return values
+    if isinstance(values, Iterable):
         return [floats(value) for value in values]
     return float(values)

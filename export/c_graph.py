@@ -16,9 +16,6 @@ from edge.model.model import Model
 from edge.model.onnx_file import Node
 
 ELEMENT_WISE = "Add Sub Mul Div Max LessOrEqual Where Clip Round Sqrt".split()
-OVERWRITING = {*ELEMENT_WISE} - {"Max"}
-"""Operators whose output may take the place of an input."""
-ALIASES = ("Squeeze",)
 REDUCTIONS = "ReduceL1 ReduceSum ReduceSumSquare ReduceMean".split()
 NAMES = {"MatMul": "Gemm", "GatherElements": "Gather", "GatherND": "Gather"}
 KNOWN = {*ELEMENT_WISE, *REDUCTIONS, *"Gemm TopK Gather Pad ArgMax".split()}
@@ -105,8 +102,10 @@ class CompiledGraph:
         ]
         names = [name for name in graph.makers if name not in self._constants[0]]
         values = graph.run(names, {"features": x})
-        self._shapes = {"features": x.shape}
-        self._shapes |= {name: v.shape for name, v in zip(names, values, strict=True)}
+        made = {"features": x} | dict(zip(names, values, strict=True))
+        self._made = set(made)
+        made |= self._constants[0]
+        self._shapes = {name: value.shape for name, value in made.items()}
         self._needs = [self._needed(outputs, i) for i in range(len(points))]
         self.tables: list[Table] = []
         self._numbers: dict[bytes, int] = {}
@@ -129,7 +128,7 @@ class CompiledGraph:
         waiting = list(outputs)
         while waiting:
             name = waiting.pop()
-            if name not in needed and name in self._makers and name in self._shapes:
+            if name not in needed and name in self._made - {"features"}:
                 needed.add(name)
                 waiting += self._inputs(self._makers[name], point)
         return needed
@@ -152,23 +151,18 @@ class CompiledGraph:
 
     def _place(self, nodes: Sequence[Node], outputs: Sequence[str]) -> None:
         """Give each value a place in the arena, from its first use to its last."""
-        last = {name: i for i, node in enumerate(nodes) for name in node.inputs}
-        last |= dict.fromkeys(outputs, len(nodes))
+        self.places = {"features": 0}
         roots = {"features": "features"}
+        last = dict.fromkeys(outputs, len(nodes))
         for i, node in enumerate(nodes):
             for name in node.outputs:
-                alias = node.operator in ALIASES
-                roots[name] = roots[node.inputs[0]] if alias else name
-                last[roots[name]] = max(last.get(roots[name], i), last.get(name, i))
-        self.places = {"features": 0}
+                squeezed = node.operator == "Squeeze"
+                roots[name] = roots[node.inputs[0]] if squeezed else name
+            for name in (*node.inputs, *node.outputs):
+                root = roots.get(name, name)
+                last[root] = max(last.get(root, 0), last.get(name, 0), i)
         taken = {"features": (0, self._shapes["features"][1])}
         for i, node in enumerate(nodes):
-            size = prod(self._shapes[node.outputs[0]])
-            for name in node.inputs:
-                # The loop of an element-wise operator reads what it overwrites first.
-                alike = name in taken and taken[name][1] - taken[name][0] == size
-                if alike and last[name] == i and node.operator in OVERWRITING:
-                    del taken[name]
             for name in node.outputs:
                 if roots[name] == name:
                     begin = _gap(taken.values(), prod(self._shapes[name]))
@@ -181,7 +175,7 @@ class CompiledGraph:
     def _steps(self, node: Node) -> Iterator[Step]:
         """The steps of a node: none of a `Squeeze`, several of a `Max`."""
         operator = NAMES.get(node.operator, node.operator)
-        if operator in ALIASES:
+        if operator == "Squeeze":
             return
         if operator not in KNOWN:
             raise InputError(f"C has no operator {operator}")
@@ -206,19 +200,14 @@ class CompiledGraph:
             return node.inputs[:1]
         return node.inputs[::2] if node.operator == "Pad" else node.inputs
 
-    def _shape(self, name: str) -> tuple[int, ...]:
-        if name in self._shapes:
-            return self._shapes[name]
-        return self._constants[0][name].shape
-
     def _sizes(self, node: Node, operator: str) -> list[int]:
         """The sizes of a step."""
-        shape = self._shape(node.inputs[0])
+        shape = self._shapes[node.inputs[0]]
         out = self._shapes[node.outputs[0]]
         if operator in ELEMENT_WISE:
             return [prod(out), *(self._broadcast(name, out) for name in node.inputs)]
         if operator == "Gemm":
-            return [*self._shape(node.inputs[1]), len(node.inputs) - 2]
+            return [*self._shapes[node.inputs[1]], len(node.inputs) - 2]
         if operator == "TopK":
             return [prod(shape[:-1]), shape[-1], out[-1]]
         if operator in ("Pad", "ArgMax"):
@@ -226,7 +215,7 @@ class CompiledGraph:
         if operator == "Gather":
             axis = node.attributes.get("axis", 0)
             axis = axis if node.operator == "Gather" else len(shape) - 1
-            count = prod(self._shape(node.inputs[1]))
+            count = prod(self._shapes[node.inputs[1]])
         else:
             (axis,) = self._constants[0][node.inputs[1]].tolist()
             count = 0
@@ -234,14 +223,14 @@ class CompiledGraph:
 
     def _broadcast(self, name: str, out: Sequence[int]) -> int:
         """How many numbers an element-wise step takes of an input: one, or all."""
-        size = prod(self._shape(name))
+        size = prod(self._shapes[name])
         if size not in (1, prod(out)):
-            raise InputError(f"C cannot combine {self._shape(name)} and {out} numbers")
+            raise InputError(f"C cannot combine {self._shapes[name]} and {out} numbers")
         return size
 
     def _operand(self, name: str) -> int:
         """The place of a value, or the number of its table."""
-        if name in self._shapes:
+        if name in self._made:
             return self.places.get(name, 0)  # of what no point needs, any
         values = np.stack([at[name].reshape(-1) for at in self._constants]).astype(
             float

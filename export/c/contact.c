@@ -3,6 +3,8 @@
 
 #define TAXELS (EC_ROWS * EC_COLS)
 #define CLOCK_ROUNDING_S 1e-6
+#define TURN 6.283185307179586 /* radians */
+#define RADIANS 0.017453292519943295 /* of a degree */
 
 ec_contact ec_now; /* the contact that is followed */
 static ec_set active;
@@ -16,15 +18,15 @@ bool ec_released(double touched_s, double now_s) {
 
 /* A point of the skin in the frame of its link. */
 static void skin_point(double row, double col, double point[3]) {
-  double angle = EC_TURN * col / EC_COLS;
+  double angle = TURN * col / EC_COLS;
   point[0] = col * EC_AROUND;
   point[1] = row * EC_ALONG;
   point[2] = 0.0;
-  if (!EC_CYLINDER) return;
+  if (EC_RADIUS_M == 0.0) return;
   if (EC_COLUMN_ANGLES) {
     uint32_t column = (uint32_t)col;
     const ec_angle *place = &ec_angles[column % EC_COLS];
-    angle = (place->angle_deg + (col - column) * place->step_deg) * EC_RADIANS;
+    angle = (place->angle_deg + (col - column) * place->step_deg) * RADIANS;
   }
   point[0] = EC_RADIUS_M * ec_cos(angle);
   point[1] = EC_RADIUS_M * ec_sin(angle);
@@ -67,11 +69,11 @@ static void carried(const double *joints, double p[3]) {
 static double distance(ec_start *start, double row, double col, const double *joints) {
   double p[3];
   skin_point(row, col, p);
-  if (EC_DOF && !joints) {
+  if (EC_LINKS && !joints) {
     ec_now.missing_pose = true;
     return EC_NAN;
   }
-  if (EC_DOF) carried(joints, p);
+  if (EC_LINKS) carried(joints, p);
   if (!start->known) {
     start->known = true;
     for (uint32_t i = 0; i < 3; i++) start->point[i] = p[i];

@@ -234,7 +234,7 @@ int ec_push(
     ec_event events[EC_MOST_EVENTS]) {
   int count = 0;
   if (!(t_s >= last_s) || t_s - t_s != 0.0) return EC_BAD_TIME;
-  for (uint32_t i = 0; joints && i < EC_ANGLES; i++) {
+  for (uint32_t i = joints ? EC_DOF : 0; i-- > 0;) {
     if (!usable(joints[i])) return EC_BAD_JOINTS;
   }
   last_s = t_s;

@@ -57,7 +57,7 @@ void ec_begin(void);
    when their windows end.
 
    counts: above the baseline, by rows from elbow to wrist; valid: which could be read, or NULL of
-   all; t_s: seconds; joints: the EC_DOF or EC_JOINTS angles in radians, or NULL where not known.
+   all; t_s: seconds; joints: the EC_DOF angles in radians, or NULL where not known.
    Returns the number of events, in the order of time, or an error below 0. */
 int ec_push(
     const uint16_t *counts, const bool *valid, double t_s, const double *joints,

@@ -61,7 +61,7 @@ static bool is_before(component a, component b) {
 
 void ec_active(const uint16_t *counts, const bool *valid, ec_set active) {
   for (uint32_t i = 0; i < TAXELS; i++) {
-    active[i] = counts[i] > EC_THRESHOLD && (!valid || valid[i]);
+    active[i] = counts[i] > EC_THRESHOLD_COUNTS && (!valid || valid[i]);
   }
 }
 
