@@ -7,16 +7,14 @@ to, until none is next to another (Shiloach and Vishkin, An O(log n) parallel
 connectivity algorithm, 1982). The rounds are few, and each is linear in the runs.
 """
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
-from edge.arrays import Array, Booleans, Integers
+from edge.arrays import Array, Booleans, Indices, Integers
 from edge.touch.grid import Grid
-
-Indices = NDArray[np.intp]
 
 
 @dataclass(frozen=True)
@@ -115,22 +113,17 @@ def all_of(
     active: Booleans,
     counts: Array,
     wraps: bool,
-) -> list[tuple[int, int]]:
-    """Taxels, as the bits of `edge.touch.grid.Grid`, and peak of each component.
+) -> Iterator[tuple[Indices, int]]:
+    """Taxels, as flat indices of `active`, and peak of each component.
 
     The arguments are those of `largest_of`.
     """
     components = components_of(active, wraps)
-    bits = [0] * len(components.areas)
-    runs = zip(
-        components.labels.tolist(),
-        components.starts.tolist(),
-        components.lengths.tolist(),
-        strict=True,
-    )
-    for label, start, length in runs:
-        bits[label] |= ((1 << length) - 1) << start
-    return list(zip(bits, _peaks(components, active, counts).tolist(), strict=True))
+    order = components.of_taxel.argsort(kind="stable")
+    taxels = np.flatnonzero(active)[order]
+    parts = np.split(taxels, components.areas.cumsum()[:-1])
+    peaks = _peaks(components, active, counts).tolist()
+    return zip(parts, peaks, strict=False)  # without a component there is one part
 
 
 def largest_of(
