@@ -109,11 +109,11 @@ class ActiveTaxels:
         bits = self._grid.flood(self._grid.bit(index) & self.bits, self.bits)
         if bits is not None and 2 * bits.bit_count() > self.bits.bit_count():
             return Region(self._grid, bits, self.counts.item(index))
-        from edge.touch.components import largest_bits  # one flood does for a touch
+        from edge.touch.components import largest_of  # one flood does for a touch
 
         before = 0 if previous is None else previous.bits
-        bits, peak = largest_bits(self._grid, self._padded, self.counts, before)
-        return Region(self._grid, bits, peak)
+        taxels, peak = largest_of(self._grid, self._padded, self.counts, before)
+        return Region(self._grid, taxels, peak)
 
     def has_other(self, region: Region, onset: int) -> bool:
         """Whether a taxel beside a region is above the onset."""

@@ -222,8 +222,6 @@ class Contact:
         """
         measurer = self._measurer
         if self._rows and age_s <= self.age_s:
-            if region is None:
-                return  # the contact was felt in this instant
             age_s = self.age_s
             self._forget_last()
         if frame.valid is not None:
