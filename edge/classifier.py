@@ -30,8 +30,6 @@ ASKED_A_SECOND = 200.0
 a workstation; 16 contacts with a decision point every tenth of a second need 160."""
 FEWEST_ASKED = 2
 """Questions that a frame may ask, however soon it follows the last one."""
-ASIDE_S = 0.4
-"""Taxels are named as set aside after so long, as a touch under way soon shows."""
 
 
 @dataclass
@@ -54,24 +52,19 @@ class Pending:
 
 
 class AsideEvents:
-    """Names the taxels that have been set aside or taken back for a while."""
+    """Names the taxels that are set aside, whenever they change."""
 
     def __init__(self, tracker: WatchfulTracker) -> None:
         self._tracker = tracker
         self._named = tracker.aside
         """(rows, cols) the taxels that the last event named."""
-        self._named_s = -math.inf
-        """When they were last those that are set aside."""
 
     def at(self, t: float) -> list[Event]:
         """The event, if there is one, after a frame at a time."""
         aside = self._tracker.aside
-        if self._named_s == -math.inf or (aside == self._named).all():
-            self._named_s = t
-        if t - self._named_s < ASIDE_S:
+        if (aside == self._named).all():
             return []
         self._named = aside
-        self._named_s = t
         return [Aside(t, tuple((row, col) for row, col in np.argwhere(aside).tolist()))]
 
 

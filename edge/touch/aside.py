@@ -57,7 +57,7 @@ class AsideTaxels:
 
     Attributes:
         aside: (rows, cols), True on the taxels that are set aside, or will be once
-            there is a touch beside them.
+            there is a touch beside them; none while there may be a touch under way.
         seen: the last frame as it was followed, or whole while it may show a touch that
             was under way in the first.
     """
@@ -220,18 +220,18 @@ class AsideTaxels:
         self._frames += 1
         if frame.t >= self._next_s:
             self._next_s = frame.t + CHECK_S
-            self._look(counts)
+            self._look(frame.t)
             self._peaks = counts * active.mask
             self._jumps = np.zeros_like(counts)
             self._frames = 0
 
-    def _look(self, counts: Integers) -> None:
+    def _look(self, t: float) -> None:
         """Judge what has been in contact since the last look, and follow the levels."""
         touched = self._peaks > self._levels + self._least()
         in_contact = np.maximum(self._looks, 0) + 1
         self._looks = np.where(touched, in_contact, np.minimum(self._looks, 0) - 1)
         long = self._looks >= self._long_looks
-        still = long & self._is_still(counts, touched)
+        still = long & self._is_still(touched)
         long &= ~still
         least = RESTLESS * self._layout.threshold_counts
         least = np.maximum(least, RESTLESS_SHARE * self._peaks)
@@ -248,7 +248,8 @@ class AsideTaxels:
         self._former = self._bits(self._looks > 1)
         # A piece of a larger contact is no lone taxel.
         of_large = self._looks.max(initial=0, where=touched & ~small)
-        self.aside = self._hidden | (long & small & (self._looks > of_large))
+        if t - self._began_s > EARLY_S:
+            self.aside = self._hidden | (long & small & (self._looks > of_large))
 
     def _follow_levels(self, at_rest: Booleans) -> None:
         falling = self._levels - self._levels // FALL_SHARE
@@ -256,8 +257,9 @@ class AsideTaxels:
         self._levels = np.where(at_rest, levels, self._levels) * ~self._broken
         self._hidden = self._broken | (self._levels > 0)
 
-    def _is_still(self, counts: Integers, touched: Booleans) -> Booleans:
+    def _is_still(self, touched: Booleans) -> Booleans:
         """Whether each count has been the same for long."""
+        counts = self._last[-1]
         near = np.maximum(0.5 * self._layout.threshold_counts, STILL_SHARE * counts)
         same = touched & (np.abs(counts - self._reference) <= near)
         self._same = np.where(same, self._same + 1, 0)

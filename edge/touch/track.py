@@ -184,7 +184,9 @@ class ContactTracker:
             contact.ended = True
             return
         contact.frames += 1
-        if not confirmed or contact.age_s < self.horizon_s:
+        # A reading without contact replaces none of its instant.
+        counts = region is not None or age_s > contact.age_s
+        if counts and (not confirmed or contact.age_s < self.horizon_s):
             contact.add(frame, active, region, age_s)
         if region is not None:
             contact.touched_s = age_s
