@@ -38,6 +38,8 @@ RESTLESS_SHARE = 0.012
 """The same over its count. A person's tremor of a twentieth has 0.008."""
 RESTLESS_LOOKS = 4
 """Looks in which a broken taxel is restless, less those in which it is not."""
+LONE_LOOKS = 4
+"""A taxel that lasts is named after so many looks in a small region."""
 QUIET_LOOKS = 40
 """A broken taxel is followed again after so many looks without contact: ten seconds, as
 one that wanders comes back."""
@@ -84,7 +86,6 @@ class AsideTaxels:
         self._next_s = frame.t
         is_first = begun_s.min() == frame.t
         self._began_s = frame.t if is_first else -math.inf
-        self._early_s = min(horizon_s, LONGEST_EARLY_S)
         self._early: list[tuple[Frame, ActiveTaxels]] = []
         """The first frames, while what is set aside may turn out to be a touch."""
         self._levels = zeros.copy()
@@ -110,6 +111,9 @@ class AsideTaxels:
         self._reference = zeros
         self._same = zeros
         """For how many looks each count has been near that reference."""
+        self._lone = zeros
+        """For how many looks each taxel has been in contact in a small region, for
+        longer than any large one."""
         self._long = 0
         """The taxels that have long been in contact, as bits of the grid."""
         self._former = 0
@@ -161,7 +165,7 @@ class AsideTaxels:
         age_s = frame.t - self._began_s
         if contacts or not self._hidden.any():
             self._early = []
-        elif age_s == 0.0 or (self._early and age_s <= self._early_s):
+        elif age_s == 0.0 or (self._early and age_s <= LONGEST_EARLY_S):
             self._early.append((frame, active))
 
     def _is_touch(
@@ -237,7 +241,7 @@ class AsideTaxels:
         least = np.maximum(least, RESTLESS_SHARE * self._peaks)
         above = touched | (self._levels > 0)
         restless = above & (self._jumps > least * self._frames)
-        small = self._small(above, restless | long)
+        small = self._small(above)
         steps = np.where(restless & small, 1, -1)
         self._restless = np.maximum(self._restless + steps, 0)
         broken = self._broken | (self._restless >= RESTLESS_LOOKS)
@@ -248,8 +252,10 @@ class AsideTaxels:
         self._former = self._bits(self._looks > 1)
         # A piece of a larger contact is no lone taxel.
         of_large = self._looks.max(initial=0, where=touched & ~small)
+        is_lone = small & (self._looks > of_large)
+        self._lone = np.where(is_lone, self._lone + 1, 0)
         if t - self._began_s > EARLY_S:
-            self.aside = self._hidden | (long & small & (self._looks > of_large))
+            self.aside = self._hidden | (long & (self._lone >= LONE_LOOKS))
 
     def _follow_levels(self, at_rest: Booleans) -> None:
         falling = self._levels - self._levels // FALL_SHARE
@@ -266,10 +272,10 @@ class AsideTaxels:
         self._reference = np.where(same, self._reference, counts)
         return 2 * self._same >= self._long_looks
 
-    def _small(self, touched: Booleans, some: Booleans) -> Booleans:
-        """The taxels of those small regions that have one of some."""
-        within = self._bits(touched)
-        rest = self._bits(some)
+    def _small(self, taxels: Booleans) -> Booleans:
+        """Those of the taxels that are in small regions."""
+        within = self._bits(taxels)
+        rest = within
         small = 0
         while rest:
             region = rest & -rest
