@@ -8,6 +8,7 @@ import numpy as np
 
 from edge.arrays import Booleans, Floats, Integers
 from edge.touch.active import ActiveTaxels, Region
+from edge.touch.components import components_of
 from edge.touch.contact import Contact
 from edge.touch.frame import Frame
 from edge.touch.grid import grid
@@ -274,17 +275,10 @@ class AsideTaxels:
 
     def _small(self, taxels: Booleans) -> Booleans:
         """Those of the taxels that are in small regions."""
-        within = self._bits(taxels)
-        rest = within
-        small = 0
-        while rest:
-            region = rest & -rest
-            for _ in range(MOST_BROKEN):
-                region |= self._grid.neighbours(region) & within
-            if region.bit_count() <= MOST_BROKEN:
-                small |= region
-            rest &= ~region
-        return self._grid.unpack(small)
+        small = np.pad(taxels, ((0, 0), (0, 1)))
+        components = components_of(small, self._layout.wraps)
+        small[small] = components.areas[components.of_taxel] <= MOST_BROKEN
+        return small[:, :-1]
 
     def _bits(self, taxels: Booleans) -> int:
         return ActiveTaxels(taxels, 0, wraps=self._layout.wraps).bits
