@@ -41,6 +41,8 @@ RESTLESS_LOOKS = 4
 """Looks in which a broken taxel is restless, less those in which it is not."""
 LONE_LOOKS = 4
 """A taxel that lasts is named after so many looks in a small region."""
+LONGER_LOOKS = 2
+"""And so many looks later than it may be set aside, as it may be a touch all the same."""
 QUIET_LOOKS = 40
 """A broken taxel is followed again after so many looks without contact: ten seconds, as
 one that wanders comes back."""
@@ -256,7 +258,8 @@ class AsideTaxels:
         is_lone = small & (self._looks > of_large)
         self._lone = np.where(is_lone, self._lone + 1, 0)
         if t - self._began_s > EARLY_S:
-            self.aside = self._hidden | (long & (self._lone >= LONE_LOOKS))
+            longer = self._looks >= self._long_looks + LONGER_LOOKS
+            self.aside = self._hidden | (longer & (self._lone >= LONE_LOOKS))
 
     def _follow_levels(self, at_rest: Booleans) -> None:
         falling = self._levels - self._levels // FALL_SHARE
