@@ -203,8 +203,8 @@ class AsideTaxels:
 
     def _hides(self, active: ActiveTaxels) -> Region | None:
         """The active taxels that have long been in contact, where a contact begins
-        beside them."""
-        if not self._long:
+        beside them and would be hidden."""
+        if not self._long or self._tracker.max_contacts > 1:
             return None
         former = self._connected(active, self._long | self._former)
         if not active.has_other(former, self._layout.onset):

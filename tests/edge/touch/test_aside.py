@@ -194,6 +194,15 @@ def test_touches_beside_someone_who_leans_and_sways_are_followed():
     assert all(same(contact, wanted[onset]) for onset, contact in contacts)
 
 
+def test_a_long_contact_goes_on_where_several_are_followed():
+    frames = leaning(8.0, swing=0.2)
+    frames[500:600, 2:4, 2:4] = 500.0
+    tracker = ContactTracker(LAYOUT, horizon_s=WINDOW_S, max_contacts=2)
+    watched = WatchfulTracker(tracker)
+    contacts = [watched.push(frame) for frame in recording(frames)][-1]
+    assert [contact.onset_s for contact in contacts] == [1.12]
+
+
 def test_a_touch_through_a_sleeve_is_felt_without_the_sleeve(wanted):
     frames = touches()
     contacts, _ = contacts_of(frames + 300.0)
