@@ -125,6 +125,7 @@ class AsideTaxels:
     def follow(self, frame: Frame, active: ActiveTaxels) -> list[Contact]:
         """As `ContactTracker.follow`, without what is set aside."""
         former = self._hidden
+        self.seen = frame
         self._watch(frame, active)
         shown = self._beside(frame)
         beside = active_taxels(shown, self._layout)
@@ -145,7 +146,8 @@ class AsideTaxels:
             over = self._tracker.end(beside)
         contacts = over + self._tracker.follow(shown, beside)
         self._keep_early(frame, active, contacts)
-        self.seen = frame if is_early else shown
+        if not is_early:
+            self.seen = shown
         return contacts
 
     def finish(self) -> list[Contact]:

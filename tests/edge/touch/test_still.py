@@ -57,6 +57,13 @@ def test_a_touch_under_way_that_grows_is_followed_from_the_first_frame():
     assert onsets(growing) == [(0.0, True)]
 
 
+def test_a_touch_that_may_be_under_way_is_seen_whole():
+    tracker = watchful(1.0)
+    for i, count in enumerate((100, 110, 300, 310)):
+        tracker.push(pressed(LAYOUT, i * PERIOD_S, {(3, 3): count}))
+        assert tracker.seen.counts[3, 3] == count
+
+
 def test_what_never_changes_is_a_late_contact_where_there_is_no_other():
     assert onsets(frames(3.0, stuck={(2, 2): (0.0, 100)})) == [(0.0, True)]
 
