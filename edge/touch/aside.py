@@ -20,6 +20,8 @@ LONGEST_EARLY_S = 10.0
 """Seconds of first frames that are kept while what is set aside may be a touch."""
 LONG_S = 2.0
 """No touch is longer, or than a second more than contacts are followed."""
+FAR_LONGER = 4
+"""What lasts so many times as long is set aside even where it is not still."""
 CHECK_S = 0.25
 """Time between two looks at the counts."""
 MOVED_SHARE = 4
@@ -53,8 +55,8 @@ class AsideTaxels:
 
     What is above the threshold in the first frame is set aside at once: it may be a
     stuck taxel, or a touch under way, which changes. Later what has been in contact for
-    longer than a touch lasts is set aside where it is still, or where a contact begins
-    beside it. A taxel that is restless, alone or with few, is broken.
+    longer than a touch lasts is set aside where it is still, where it lasts far longer,
+    or where a contact begins beside it. A taxel that is restless, alone or with few, is broken.
 
     Of a taxel that is set aside the level is subtracted, so that a touch on what leans
     there is felt. The level follows the highest count from look to look, and is gone
@@ -240,7 +242,8 @@ class AsideTaxels:
         in_contact = np.maximum(self._looks, 0) + 1
         self._looks = np.where(touched, in_contact, np.minimum(self._looks, 0) - 1)
         long = self._looks >= self._long_looks
-        still = long & self._is_still(touched)
+        far_longer = self._looks >= FAR_LONGER * self._long_looks
+        still = long & self._is_still(touched) | far_longer
         long &= ~still
         least = RESTLESS * self._layout.threshold_counts
         least = np.maximum(least, RESTLESS_SHARE * self._peaks)
