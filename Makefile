@@ -53,7 +53,7 @@ help:
 	@echo "  make hard-cases-versions   the same answers from other ONNX Runtimes"
 	@echo "  make mutants       make 200 random changes to the code: does a test notice each?"
 	@echo "  make fuzz          read 5,000 damaged files of each kind: no crash, no traceback, small memory"
-	@echo "  make kills         kill record, label and export 60 times each: no damaged file"
+	@echo "  make kills         kill each command that writes files 60 times: none is damaged"
 	@echo "Upkeep"
 	@echo "  make golden        renew the small model and outputs that the tests compare with"
 	@echo "  make demo-data     renew the model and the touches that the wheel carries"
@@ -217,8 +217,7 @@ else
 BOARD := $(OUT)/tradeoff/board.json
 tradeoff: $(READY)
 	$(BIN)/python -m train tradeoff --data $(RECORDINGS) --out $(OUT)/tradeoff --check
-	$(BIN)/python -m export --data $(RECORDINGS) --out $(OUT)/tradeoff \
-	  $(filter --quick,$(TRADEOFF))
+	$(BIN)/python -m export --data $(RECORDINGS) --out $(OUT)/tradeoff --quick
 	$(BIN)/edge-classify bench --model $(OUT)/tradeoff/model.onnx --out $(BOARD)
 endif
 	$(BIN)/python -m train tradeoff --data $(RECORDINGS) $(STUDIED) --board $(BOARD) \
@@ -383,7 +382,7 @@ constraints: $(VENV)/.upkeep
 fuzz: $(DEV)
 	FUZZ_FILES=5000 $(BIN)/python -m pytest tests/fuzz -n 2 -v $(FUZZ)
 
-# KILLS="--count 10": fewer of them.
+# KILLS="--count 10 --only install": fewer of them.
 kills: $(DEV)
 	$(BIN)/python -m tests.kills $(KILLS)
 

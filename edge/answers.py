@@ -4,10 +4,10 @@ from dataclasses import replace
 
 from edge.errors import OutOfRange
 from edge.events import Decided
-from edge.model.info import NOVELTY_RATE, ModelInfo
+from edge.model.info import ModelInfo
 from edge.model.model import Decision, Model
 from edge.touch.contact import Contact, FeatureSeries
-from edge.touch.doubts import frame_doubts
+from edge.touch.doubts import frame_doubts, is_several
 
 
 def answers_about(
@@ -50,17 +50,19 @@ def answers_about(
     except OutOfRange:
         answer = answer.flagged(out_of_range=True)
         return {task: replace(answer, task=task) for task in info.tasks}
+    if any(decision.label in info.several_labels for decision in decisions.values()):
+        answer = answer.flagged(several=False)
     if info.novelty is not None:
-        score = decisions[info.novelty.task].novelty
-        unknown = info.novelty.rate(point, score) <= NOVELTY_RATE
-        answer = answer.flagged(unknown=unknown)
-        if unknown and window_s == info.window_s:
-            from edge.model.unusual import unusual  # few contacts are unknown
+        score = next(iter(decisions.values())).novelty
+        is_unusual = score > info.novelty.limits[point]
+        answer = answer.flagged(unusual=is_unusual)
+        if is_unusual and window_s == info.window_s:
+            from edge.model.unusual import unusual  # few contacts are unusual
 
             phrase = unusual(vector, info.widths, info.usual)
             answer = replace(answer, unusual=phrase)
     return {
-        task: _answer(replace(answer, task=task), decision, info)
+        task: _answer(replace(answer, task=task), decision, info, point)
         for task, decision in decisions.items()
     }
 
@@ -72,9 +74,15 @@ def contact_doubts(
     window_s: float,
 ) -> dict[str, bool]:
     """{flag: whether it holds} for what was measured of a contact, see `edge.flags`."""
-    limits = () if info.chain is None else info.chain.limits
+    doubts = frame_doubts(series, window_s)
+    if info.joints:
+        from edge.touch.joint_doubts import joint_doubts  # not every model has joints
+
+        limits = () if info.chain is None else info.chain.limits
+        doubts |= joint_doubts(series, window_s, limits, info.still_s, info.speeds)
     return {
-        **frame_doubts(series, window_s, info.several, limits),
+        **doubts,
+        "several": is_several(series.felt(window_s)),
         "missing_taxels": contact.missing_taxels,
         "missing_pose": contact.missing_pose,
         "late": contact.late,
@@ -91,13 +99,18 @@ def _position(contact: Contact) -> tuple[float, float, float] | None:
     return x, y, z
 
 
-def _answer(blank: Decided, decision: Decision, info: ModelInfo) -> Decided:
+def _answer(
+    blank: Decided,
+    decision: Decision,
+    info: ModelInfo,
+    point: int,
+) -> Decided:
     """A task's answer, with the doubts of the decision."""
     confidence = decision.confidence
-    return replace(
+    answer = replace(
         blank,
         label=decision.label,
-        confidence=None if confidence is None else round(confidence, 6),
+        confidence=confidence and round(confidence, 6),
         nearest=tuple(map(info.trial, decision.neighbours.tolist())),
         decision=decision,
     ).flagged(
@@ -105,3 +118,13 @@ def _answer(blank: Decided, decision: Decision, info: ModelInfo) -> Decided:
         out_of_range=decision.out_of_range,
         tie=decision.tie,
     )
+    stopping = info.stopping.get(blank.task)
+    doubt = stopping and stopping.remoteness
+    if doubt and decision.remoteness > doubt.limits[point]:
+        return withheld(answer)
+    return answer
+
+
+def withheld(answer: Decided) -> Decided:
+    """The answer without a label, flagged as `unknown`."""
+    return replace(answer, label=None, confidence=0.0).flagged(unknown=True)

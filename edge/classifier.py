@@ -23,14 +23,13 @@ if TYPE_CHECKING:
     from edge.recording import Recording
     from edge.skin.loop import JointSource
     from edge.skin.skin import Skin
+    from edge.touch.still import WatchfulTracker
 
 ASKED_A_SECOND = 200.0
 """Questions to the model about several contacts. Each takes one to two milliseconds on
 a workstation; 16 contacts with a decision point every tenth of a second need 160."""
 FEWEST_ASKED = 2
 """Questions that a frame may ask, however soon it follows the last one."""
-ASIDE_S = 0.5
-"""Taxels are named as set aside after so long, as a touch under way soon shows."""
 
 
 @dataclass
@@ -50,6 +49,23 @@ class Pending:
     decision_point: int
     tasks: list[str]
     decided: dict[str, Decided] = field(default_factory=dict)
+
+
+class AsideEvents:
+    """Names the taxels that are set aside, whenever they change."""
+
+    def __init__(self, tracker: WatchfulTracker) -> None:
+        self._tracker = tracker
+        self._named = tracker.aside
+        """(rows, cols) the taxels that the last event named."""
+
+    def at(self, t: float) -> list[Event]:
+        """The event, if there is one, after a frame at a time."""
+        aside = self._tracker.aside
+        if (aside == self._named).all():
+            return []
+        self._named = aside
+        return [Aside(t, tuple((row, col) for row, col in np.argwhere(aside).tolist()))]
 
 
 class Classifier:
@@ -78,9 +94,9 @@ class Classifier:
     which no rule is certified is decided at the full window, flagged `uncertified`. A
     task that is the product of two others, as category is of softness and mobility,
     never contradicts them: it is decided when both are, by their labels, and they
-    follow its rule where it has one. An unknown contact waits for the full window, and
-    the label of the task with the most labels, such as the object, is then "unknown".
-    `unsure` flags that the window ended before the confidence was reached.
+    follow its rule where it has one; where they have faster ones, it waits for a fixed
+    window. An unusual contact waits for the full window. `unsure` flags that the window
+    ended before the confidence was reached.
 
     A decision has flags, the reasons to doubt it: see `edge.flags`.
 
@@ -141,10 +157,7 @@ class Classifier:
         """The numbers of the contacts under way; None if one is followed."""
         self._begun = 0
         self._end_s: float | None = None
-        self._aside = np.zeros(self.layout.shape, dtype=np.bool_)
-        """(rows, cols) the taxels that the last event named as set aside."""
-        self._aside_s = -math.inf
-        """When that mask was last the tracker's."""
+        self._aside = AsideEvents(self.tracker)
         self._untouched: Untouched | None = None
         if any(task.no_contact is not None for task in model.info.tasks.values()):
             from edge.no_contact import Untouched  # few models know no contact
@@ -163,7 +176,7 @@ class Classifier:
         if self._untouched is not None and self._begun == 0:
             self._untouched.push(frame)
         contacts = self.tracker.push(frame)
-        events = self._set_aside(frame.t) + self._follow(contacts, frame.t)
+        events = self._aside.at(frame.t) + self._follow(contacts, frame.t)
         return events + self._decide_due(frame.t, began, most)
 
     def _most_asked(self, t: float) -> float:
@@ -201,17 +214,6 @@ class Classifier:
     def _due_s(self, pending: Pending) -> float:
         """When the contact's next decision point comes."""
         return pending.contact.onset_s + self._points_s[pending.decision_point]
-
-    def _set_aside(self, t: float) -> list[Event]:
-        """The event of taxels that have been set aside or taken back for a while."""
-        aside = self.tracker.still.aside
-        if self._aside_s == -math.inf or (aside == self._aside).all():
-            self._aside_s = t
-        if t - self._aside_s < ASIDE_S:
-            return []
-        self._aside = aside
-        self._aside_s = t
-        return [Aside(t, tuple((row, col) for row, col in np.argwhere(aside).tolist()))]
 
     def _begin(self, contact: Contact) -> Onset:
         """Number a contact, and let its tasks wait."""

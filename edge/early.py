@@ -6,16 +6,15 @@ import logging
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
+from edge.answers import withheld
 from edge.elementary import logistic
 from edge.errors import InputError
 from edge.events import Decided
 from edge.model.agreement import product_label
 from edge.model.info import (
-    UNKNOWN,
     ModelInfo,
     Stopping,
     StoppingRule,
-    check_rate,
     margin,
 )
 from edge.model.model import Decision, Model
@@ -35,7 +34,9 @@ def policies(model: Model, error: float) -> Mapping[str, Policy]:
         if rule is None:
             policy_of[task] = Uncertified(model.info)
         else:
-            kind = Product if task in model.info.products else Early
+            # At a fixed window a product needs no answers of its factors.
+            waits = task in model.info.products and not is_fixed(rule)
+            kind = Product if waits else Early
             policy_of[task] = kind(model.info, task, rule, error)
     return policy_of
 
@@ -50,6 +51,11 @@ def is_sure(
     """Whether a label is sure enough for a rule; see `Stopping.confidence`."""
     log_odds = stopping.slope * margin(distances, label) + stopping.intercept
     return logistic(log_odds - stopping.doubt * excess) >= rule.confidence
+
+
+def is_fixed(rule: StoppingRule) -> bool:
+    """Whether a rule waits for a fixed window."""
+    return rule.confidence > 1.0
 
 
 class Uncertified:
@@ -93,7 +99,6 @@ class Early:
         self._rule = rule
         self._error = error
         self._stopping = info.stopping[task]
-        self._names_unknown = info.novelty is not None and info.novelty.task == task
 
     def answer(
         self,
@@ -103,19 +108,19 @@ class Early:
     ) -> Decided | None:
         """The answer at a decision point; None if the task goes on waiting.
 
-        An unknown contact waits for the full window.
+        An unusual contact waits for the full window.
 
         Args:
             candidate: the model's answer.
             point: index of the decision point.
             decided: the answers to the contact's other tasks so far.
         """
-        unknown = UNKNOWN in candidate.flags
+        waits = "unusual" in candidate.flags
         sure = self._is_sure(candidate, point)
-        last = len(self._info.decision_points_s) - 1 if unknown else self._rule.last
-        if point < last and (unknown or not sure):
+        last = len(self._info.decision_points_s) - 1 if waits else self._rule.last
+        if point < last and (waits or not sure):
             return None
-        return self._answered(candidate, point, sure)
+        return self._answered(candidate, sure)
 
     def _is_sure(self, candidate: Decided, point: int) -> bool:
         decision = _decision(candidate)
@@ -129,17 +134,9 @@ class Early:
         distances = decision.label_distances.tolist()
         return is_sure(self._stopping, self._rule, distances, label, excess)
 
-    def _answered(self, candidate: Decided, point: int, sure: bool) -> Decided:
+    def _answered(self, candidate: Decided, sure: bool) -> Decided:
         """The answer of the rule."""
-        novelty = self._info.novelty
-        if UNKNOWN in candidate.flags and self._names_unknown and novelty is not None:
-            rate = novelty.rate(point, _decision(candidate).novelty)
-            candidate = replace(
-                candidate,
-                label=UNKNOWN,
-                confidence=round(1.0 - rate, 6),
-            )
-        elif not sure and not self._rule.fixed:
+        if candidate.label is not None and not sure and not is_fixed(self._rule):
             candidate = candidate.flagged(unsure=True)
         stopped_by = "confidence" if sure else "window"
         answer = replace(candidate, error=self._error, stopped_by=stopped_by)
@@ -147,7 +144,8 @@ class Early:
 
 
 class Product(Early):
-    """Decide when both factors are, by their labels."""
+    """Decide when both factors are, by their labels. A pair that was never met has no
+    name."""
 
     def answer(
         self,
@@ -168,7 +166,10 @@ class Product(Early):
             indices[factor] = labels.index(str(answer.label))
             confidence *= answer.confidence or 0.0
             sure = sure and answer.stopped_by == "confidence"
-        label = self._task.labels[product_label(factors, indices)]
+        index = product_label(factors, indices)
+        if index is None or candidate.label is None:
+            return self._answered(withheld(candidate), sure)
+        label = self._task.labels[index]
         decision = _decision(candidate)._replace(label=label)
         confidence = round(confidence, 6)
         candidate = replace(
@@ -177,7 +178,7 @@ class Product(Early):
             confidence=confidence,
             decision=decision,
         )
-        return self._answered(candidate, point, sure)
+        return self._answered(candidate, sure)
 
 
 Policy = Uncertified | Early
@@ -197,14 +198,15 @@ def stopping_rules(model: Model, error: float) -> dict[str, StoppingRule | None]
         InputError: the rate is outside (0, 1), or is certified for no task; the message
             names the errors that are.
     """
-    check_rate(error, "the error rate")
+    if not 0.0 < error < 1.0:
+        raise InputError(f"the error rate must be above 0 and below 1, not {error:g}")
     if not model.info.decision_points_s:
         raise InputError(
             f"{model.path}: the model has no calibration, so no error rate can be "
             "held; export it with --decision-points"
         )
     rules = {
-        task: stopping.rule(error) for task, stopping in model.info.stopping.items()
+        task: fastest(stopping, error) for task, stopping in model.info.stopping.items()
     }
     if not any(rules.values()):
         reasons = (
@@ -215,6 +217,12 @@ def stopping_rules(model: Model, error: float) -> dict[str, StoppingRule | None]
             f"{'; '.join(reasons)}"
         )
     return rules
+
+
+def fastest(stopping: Stopping, error: float) -> StoppingRule | None:
+    """The fastest rule that is certified for an error rate; or None."""
+    certified = [rule for rule in stopping.rules if rule.error <= error]
+    return certified[-1] if certified else None
 
 
 def log_rules(model: Model, error: float) -> None:
@@ -230,7 +238,7 @@ def log_rules(model: Model, error: float) -> None:
                 f"cannot be certified: {refusal(model.info.stopping[task], error)}"
             )
             continue
-        if rule.fixed:
+        if is_fixed(rule):
             time = f"always after {model.decision_points_s[rule.last]:g} s"
         else:
             time = f"when sure, in training after {rule.mean_s:.2f} s on average"

@@ -45,8 +45,8 @@ class Decided:
 
     Attributes:
         task: the question.
-        label: its answer; "unknown" if no trained label fits, None if the features are
-            too large to be compared with the training rows.
+        label: its answer; None if the thing is unknown, or the features are too large
+            to be compared with the training rows.
         confidence: the calibrated probability that the label is right, 0 to 1; None
             of a model without calibration.
         window_s: seconds from onset on which the decision is based.
@@ -62,7 +62,7 @@ class Decided:
         model: name and version of the model, if it has a name.
         strongest: without a contact, the largest count of any taxel, as a part of the
             count at which a contact begins; else None.
-        unusual: of an unknown contact, what is most unlike training, as a phrase.
+        unusual: of an unusual contact, what is most unlike training, as a phrase.
         nearest: names of the nearest training trials, which voted, or their numbers in
             a model without names.
         decision: the model's own answer, with the votes and the nearest training
@@ -100,7 +100,7 @@ class Decided:
         """The event as a JSON object."""
         line = {**_line("decision", self), "window_s": self.window_s}
         if self.contact is not None:
-            line["place"] = None if self.position is None else list(self.position)
+            line["place"] = self.position and list(self.position)
         for key in ("task", "label", "confidence", "latency_ms"):
             line[key] = getattr(self, key)
         for key in ("strongest", "error", "stopped_by", "unusual", "model"):

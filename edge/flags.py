@@ -8,15 +8,23 @@ FLAGS = {
     ),
     "short": "the stream ended inside the window; the last values were held",
     "gap": (
-        "more than a twelfth of the window (0.1 s of 1.2 s), and more than two usual "
+        "more than a 24th of the window (0.05 s of 1.2 s), and more than two usual "
         "steps, lies between two frames; also if times are not in seconds"
     ),
-    "frozen": "frames repeat bit for bit for as long",
+    "frozen": "frames repeat bit for bit for twice as long",
+    "speed": (
+        "the arm came more slowly than in 99 % of the training trials, so that what it "
+        "would still have moved may be called fixed; or faster than in 99 %, by 15 %"
+    ),
     "several": (
         "a second region beside the contact in a fifth of the window, as fewer than a "
-        "fifth of the training trials had"
+        "fifth of the training trials with the named label had (of the task with the "
+        "most labels, such as the object)"
     ),
-    "still_joints": "joint angles never change in the window",
+    "still_joints": (
+        "a joint's angle stays the same for longer than in 99 % of the training trials, "
+        "by more than a 24th of the window: it has stopped, or comes late"
+    ),
     "joint_limits": "joint angles lie beyond their limits",
     "missing_taxels": "taxels could not be read in part of the window",
     "missing_pose": "joint angles were absent in part of the window",
@@ -37,10 +45,15 @@ FLAGS = {
         "the features lie far outside those of training and were cut off; `label` is "
         "null where they could not be scaled at all"
     ),
+    "unusual": (
+        "the touch is unlike all training trials, as if the skin, the arm or their "
+        "surroundings had changed: every answer is in doubt, and with `--error` waits "
+        "for the full window"
+    ),
     "unknown": (
-        "the touch is unlike all training trials. With `--error` it waits for the full "
-        "window, and the task with the most labels, such as the object, answers "
-        '"unknown"'
+        "the thing is far from all that training met: `label` is null, and the answers "
+        "of other tasks stand. Only the task that names things, which has the most "
+        "labels but for kinds such as category, has this flag"
     ),
     "tie": "another label had the same number of votes",
     "unsure": "with `--error`: the window ended before the confidence was reached",

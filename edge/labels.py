@@ -1,11 +1,26 @@
 """Tasks whose labels are made of two others' labels: a category is softness by
 mobility."""
 
+import logging
 from collections.abc import Mapping
 from dataclasses import dataclass
 
+LOG = logging.getLogger(__name__)
+
 Labels = Mapping[str, str]
 """{task: label} of a trial."""
+
+
+def plain(labels: Labels, path: str) -> dict[str, str]:
+    """Labels of a file without blanks at their ends, and with _ for what cannot be
+    printed; a warning says so."""
+    texts = []
+    for text in (*labels, *labels.values()):
+        shown = [c if c.isprintable() else "_" for c in text.strip()]
+        texts.append("".join(shown) or "_")
+    read = dict(zip(texts, texts[len(labels) :], strict=False))
+    LOG.warning(f"{path}: the labels {dict(labels)} are read as {read}")
+    return read
 
 
 @dataclass(frozen=True)

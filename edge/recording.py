@@ -155,7 +155,7 @@ def checked(path: str, recording: Recording, scale: float | None = None) -> Reco
         elif layout.axes:
             raise InputError("meta.skin says axes = 3, but shear is missing")
         if "labels" in meta:
-            meta["labels"] = _labels(meta["labels"])
+            meta["labels"] = _labels(path, meta["labels"])
         if meta.get("joint_names") is not None:
             _check_joint_names(meta["joint_names"], joints)
     return Recording(t, frames, joints, recording.valid, meta, recording.shear)
@@ -236,21 +236,25 @@ def _joints(values: Any, frames: int) -> Floats | None:
     return joints
 
 
-def _are_names(texts: object) -> bool:
-    if not isinstance(texts, list):
-        return False
-    return all(isinstance(text, str) and text != "" for text in texts)
+def _are_names(texts: Any) -> bool:
+    return isinstance(texts, list) and all(
+        isinstance(text, str) and text for text in texts
+    )
 
 
-def _labels(values: Any) -> dict[str, str]:
+def _labels(path: str, values: Any) -> dict[str, str]:
     """{task: label}; labels that are whole numbers become text."""
-    labels = {}
-    if isinstance(values, dict):
-        for task, label in values.items():
-            is_whole = type(label) is int or isinstance(label, np.integer)
-            labels[task] = str(label) if is_whole else label
-    if not isinstance(values, dict) or not _are_names([*labels, *labels.values()]):
+    labels = dict(values) if isinstance(values, dict) else {"": ""}
+    for task, label in labels.items():
+        if type(label) is int or isinstance(label, np.integer):
+            labels[task] = str(label)
+    names = [*labels, *labels.values()]
+    if not _are_names(names):
         raise InputError("meta.labels must map task names to labels, both text")
+    if not all(name.isprintable() and name == name.strip() for name in names):
+        from edge.labels import plain  # few labels need it
+
+        return plain(labels, path)
     return labels
 
 
@@ -302,8 +306,7 @@ def load_arrays(
         arrays = {}
         for key, info in members.items():
             with archive.open(info) as stream:
-                array = np.lib.format.read_array(stream, allow_pickle=False)
-                arrays[key] = np.asarray(array)
+                arrays[key] = np.lib.format.read_array(stream, allow_pickle=False)
     return arrays
 
 

@@ -1,20 +1,55 @@
-"""Recordings written and found: files of one trial each."""
+"""Recordings in folders: written, found, and changed by one program at a time.
+
+A change of labels, or a deletion, is noted in a journal in each folder, then carried out.
+Whatever reads a folder finishes it. In the end the journal becomes the note by which the
+change is taken back.
+"""
 
 import json
 import logging
 import os
+import shutil
+import time
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import ExitStack, contextmanager, suppress
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from edge.arrays import Array
-from edge.errors import InputError
-from edge.recording import KEYS, Recording, checked, warn_of_another_unit
+from edge.config import parse_json
+from edge.errors import InputError, about
+from edge.files import parsing, read_text, refusing
+from edge.labels import Labels
+from edge.recording import KEYS, Recording, checked, load, warn_of_another_unit
 from edge.touch.thresholds import doubt
-from edge.writing import write_whole
+from edge.writing import lock, remove_leftovers, write_whole
 
 LOG = logging.getLogger(__name__)
+JOURNAL = ".edge-classify-labels.json"
+"""The journal of a change that is not finished."""
+UNDO = ".edge-classify-undo.json"
+"""The note of the last change."""
+DELETED = ".edge-classify-deleted"
+"""The folder of recordings that were deleted last."""
+LOOK_S = 0.02
+LOOKS = 250
+"""How often to look whether another program has ended."""
+
+
+Pair = tuple[Labels | None, Labels | None]
+"""The labels of a recording before and after a change; None where it is deleted."""
+
+
+@dataclass(frozen=True)
+class Change:
+    """What changes in a folder: the labels of files, and whether this takes the last
+    change back."""
+
+    labels: dict[str, Pair] = field(default_factory=dict)
+    undo: bool = False
 
 
 def save(
@@ -90,17 +125,20 @@ def save_arrays(
         write(file, meta=np.array(text), **arrays)  # type: ignore[arg-type]
 
 
-def find(paths: list[str]) -> list[Path]:
+def find(paths: Iterable[str]) -> list[Path]:
     """The `.npz` files named, and those in the folders named (sorted, folders within
-    too).
+    too), after interrupted changes are finished.
 
     Raises:
-        InputError: a folder holds no recording.
+        InputError: a folder holds no recording, or a change cannot be finished.
     """
     files: list[Path] = []
     for path in map(Path, paths):
         # Path.is_dir raises for a name that is too long.
-        inside = recordings_in(path) if os.path.isdir(path) else [path]
+        is_folder = os.path.isdir(path)
+        parents = path.rglob(JOURNAL) if is_folder else [path]
+        finish_interrupted({file.parent for file in parents})
+        inside = recordings_in(path) if is_folder else [path]
         if not inside:
             raise InputError(f"{path}: no .npz recording in this folder")
         files += inside
@@ -116,3 +154,149 @@ def recordings_in(folder: Path) -> list[Path]:
         if not any(name.startswith(".") for name in names):
             files.append(path)
     return sorted(files)
+
+
+def finish_interrupted(folders: Iterable[Path]) -> None:
+    """Wait for changes in folders that are under way, and finish interrupted ones.
+
+    Raises:
+        InputError: a change takes long, or cannot be finished.
+    """
+    with alone(folder for folder in folders if os.path.lexists(folder / JOURNAL)):
+        pass
+
+
+@contextmanager
+def alone(folders: Iterable[Path]) -> Iterator[None]:
+    """Let no other program change the folders' recordings during the block, and finish
+    interrupted changes first.
+
+    Raises:
+        InputError: another program changes them, or a change cannot be finished.
+    """
+    with ExitStack() as stack:
+        for folder in sorted({folder.resolve() for folder in folders}):
+            with suppress(OSError):  # Windows opens no folder; others name what fails
+                handle = os.open(folder, os.O_RDONLY)
+                stack.callback(os.close, handle)
+                _lock(handle, folder)
+            remove_leftovers(folder)
+            with about(f"{folder}: a change of labels was interrupted"):
+                finished = len(_finish(folder))
+            if finished:
+                LOG.warning(
+                    f"{folder}: finished a change of labels that was interrupted; "
+                    f"recordings: {finished}"
+                )
+        yield
+
+
+def _lock(handle: int, folder: Path) -> None:
+    """Wait for other programs, and lock a folder.
+
+    Raises:
+        InputError: another program takes long.
+    """
+    for _ in range(LOOKS):
+        with suppress(BlockingIOError):
+            return lock(handle)
+        time.sleep(LOOK_S)
+    raise InputError(
+        f"{folder}: another program is changing labels here; try again when it has ended"
+    )
+
+
+def _noted(note: Path) -> Change:
+    """The change that a file tells of; an empty one without the file.
+
+    Raises:
+        InputError: the file is damaged.
+    """
+    if not note.is_file():
+        return Change()
+    entries = parse_json(read_text(note), str(note))
+    with parsing(str(note), "a change of labels", "; delete it"):
+        change = Change(**entries)
+        labels = {Path(file).name: (a, b) for file, (a, b) in change.labels.items()}
+    return replace(change, labels=labels)
+
+
+def _finish(folder: Path) -> list[Path]:
+    """Do what a folder's journal says, if there is one, as far as it is not done yet;
+    the recordings that changed."""
+    changed = []
+    journal = folder / JOURNAL
+    change = _noted(journal)
+    for file, (before, after) in change.labels.items():
+        path = folder / file
+        way = [path, folder / DELETED / file]
+        source, goal = reversed(way) if before is None else way
+        if not source.is_file():
+            continue
+        if before is None or after is None:
+            source.rename(goal)
+            changed.append(path)
+            continue
+        recording = load(path)
+        if recording.labels != after:
+            save(path, replace(recording, meta={**recording.meta, "labels": after}))
+            changed.append(path)
+    if change.undo:
+        (folder / UNDO).unlink(missing_ok=True)
+        journal.unlink()
+    elif change.labels:
+        journal.replace(folder / UNDO)
+    return changed
+
+
+def _begin(changes: Mapping[Path, Change]) -> list[Path]:
+    """Note what changes in each folder, and carry it out; the recordings that changed."""
+    with ExitStack() as stack:  # all journals get their names one just after another
+        for folder, change in changes.items():
+            file = stack.enter_context(write_whole(folder / JOURNAL))
+            file.write(json.dumps(vars(change)).encode())
+    return [path for folder in changes for path in _finish(folder)]
+
+
+def change_all(changes: Mapping[Path, Labels | None]) -> None:
+    """Give recordings new labels, or delete those that get None: all of them, or a later
+    start does.
+
+    Call it in a block of `alone`.
+
+    Raises:
+        InputError: a recording cannot be read or written.
+    """
+    of_folder: dict[Path, Change] = {}
+    for path in changes:
+        change = of_folder.setdefault(path.parent, Change())
+        change.labels[path.name] = load(path).labels, changes[path]
+    for folder in of_folder:
+        with refusing(f"{folder}: its recordings cannot be changed"):
+            (folder / UNDO).unlink(missing_ok=True)
+            shutil.rmtree(folder / DELETED, ignore_errors=True)
+            if None in changes.values():
+                (folder / DELETED).mkdir()
+    _begin(of_folder)
+
+
+def take_back(folders: Iterable[Path]) -> list[Path]:
+    """Take the last change in each folder back; the recordings that changed.
+
+    Call it in a block of `alone`.
+
+    Raises:
+        InputError: by now, another recording has the name of a deleted one.
+    """
+    back: dict[Path, Change] = {}
+    for folder in folders:
+        labels = {}
+        for file, (before, after) in _noted(folder / UNDO).labels.items():
+            labels[file] = after, before
+            if after is None and (folder / file).exists():
+                raise InputError(
+                    f"{folder / file}: exists again; rename it, and undo then"
+                )
+        if labels:
+            back[folder] = Change(labels, undo=True)
+    return _begin(back)

@@ -20,8 +20,8 @@ YOUNG_S = 2.0
 """A file this young may not have been locked yet."""
 
 
-def lock(file: IO[bytes]) -> None:
-    """Mark a file as being written, for as long as it is open.
+def lock(file: IO[bytes] | int) -> None:
+    """Mark a file or a folder as being written, for as long as it is open.
 
     On Windows an open file cannot be deleted, and needs no lock.
 

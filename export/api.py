@@ -15,7 +15,6 @@ import numpy as np
 from edge import __version__
 from edge.model.info import ModelInfo, Task
 from edge.model.model import Model
-from edge.touch.doubts import is_several
 from edge.touch.track import DEBOUNCE
 from edge.writing import write_whole
 from export import golden
@@ -23,6 +22,7 @@ from export.graph import to_onnx
 from train.data.dataset import DataSet
 from train.data.groups import TRIAL
 from train.data.labels import NO_CONTACT
+from train.data.usual import usual_touches
 from train.fitting import Fitted
 from train.model.pipeline import ContactClassifier
 from train.report.summary import names
@@ -50,6 +50,8 @@ def save(path: str | os.PathLike[str], fitted: Fitted, name: str | None = None) 
     target = Path(path)
     with write_whole(target) as file:
         file.write(data)
+        file.flush()
+        Model(file.name)  # one that cannot be read leaves the former one in its place
     golden.write(
         target.with_name("golden.npz"),
         Model(target),
@@ -88,7 +90,7 @@ def describe(fitted: Fitted, name: str | None = None) -> ModelInfo:
             "python": platform.python_version(),
             **{package: version(package) for package in packages},
         },
-        several=several_share(dataset, fitted.window_s),
+        **usual_touches(dataset, list(fitted.classifier.choices), fitted.window_s),
         name=folder if name is None else name,
         trials=trials if sum(map(len, trials)) <= MOST_NAMES else (),
         **_calibration(fitted),
@@ -145,19 +147,16 @@ def usual_ranges(
     return ranges
 
 
-def several_share(dataset: DataSet, window_s: float) -> float:
-    """Share of the trials with a second region beside the contact."""
-    windows = [trial.series.felt(window_s) for trial in dataset.trials]
-    return sum(map(is_several, windows)) / len(windows)
-
-
 def measure(fitted: Fitted) -> list[tuple[float, float]]:
     """For each candidate: microseconds of a decision on this machine, and kilobytes."""
     return [_measured(fitted, i) for i in range(len(fitted.candidates))]
 
 
 def _measured(fitted: Fitted, candidate: int) -> tuple[float, float]:
-    choices = {task: chosen.picks[candidate] for task, chosen in fitted.chosen.items()}
+    picks = {task: chosen.picks[candidate] for task, chosen in fitted.chosen.items()}
+    choices = {task: choice for task, choice in picks.items() if choice is not None}
+    if not choices:
+        return 0.0, 0.0
     dataset, vectors = fitted.selection(choices.values())
     classifier = ContactClassifier.of(choices, vectors)
     of_candidate = replace(

@@ -292,15 +292,18 @@ def held_out_text(
 ) -> str:
     """The accuracy on recordings that were not fitted, also of a former model."""
     summary = _scored(model, recordings)
-    lines = [_heading(model), summary.text()]
+    lines = [_heading(model, summary), summary.text()]
     if former is not None:
         before = _scored(former, recordings)
-        lines += [_heading(former), before.text()]
+        lines += [_heading(former, before), before.text()]
         lines.append(compared(former.path, before, model.path, summary))
     return "\n\n".join(lines)
 
 
-def _heading(model: Model) -> str:
+def _heading(model: Model, summary: Summary) -> str:
+    """What a model was scored on."""
+    if summary.as_trained:
+        return f"{model.path} on recordings with {summary.as_trained} of its training:"
     return f"{model.path} on recordings that it was not fitted on:"
 
 

@@ -9,6 +9,7 @@ finite with label -1.
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -23,11 +24,19 @@ from edge.model import onnx_file
 from edge.model.info import METADATA_KEY, ModelInfo
 from edge.model.metadata import to_json
 from export.build import OPSET, Builder, project, widened
-from train.model.novelty import CLIP, FARTHEST, STEP_BITS, NoveltySpace
+from train.model.novelty import (
+    CLIP,
+    FARTHEST,
+    STEP_BITS,
+    NoveltyPoint,
+    NoveltySpace,
+)
 from train.model.pipeline import ContactClassifier, FittedSpace, nearest_of_label
 from train.model.stopping import SequentialClassifier
 
 IR_VERSION = 8
+DIGEST = b"rX\n\x14edge-classify-digest\x12@"
+"""Begins the field of the digest in a ModelProto: an entry of metadata of 64 digits."""
 LARGEST = float(np.finfo(np.float64).max)
 Fitted = ContactClassifier | SequentialClassifier
 
@@ -126,7 +135,7 @@ def _convert(scope: Any, operator: Any, container: Any) -> None:
             projected[spaces] = _projected(build, x, points, spaces)
     _out_of_range(build, [off for _, off in projected.values()], names["out_of_range"])
     if isinstance(model, SequentialClassifier):
-        _novelty(build, x, model.space_, names["novelty"])
+        _doubt(build, x, model.space_, names)
     for task in model.choices:
         _task(build, points, task, projected[_spaces(points, task)], names)
 
@@ -226,9 +235,14 @@ def _out_of_range(build: Builder, excesses: Sequence[str], output: str) -> None:
     build.node("Squeeze", beyond, [1], output=output)
 
 
-def _novelty(build: Builder, x: str, space: NoveltySpace, output: str) -> None:
-    """Nodes that score how unlike all training trials features (n, p) are; see
-    `train.model.novelty`."""
+def _doubt(
+    build: Builder,
+    x: str,
+    space: NoveltySpace,
+    names: Mapping[str, str],
+) -> None:
+    """Nodes that score how unlike all training trials features (n, p) are, by their
+    novelty and remoteness; see `train.model.novelty`."""
     points = space.points
     means = build.by_decision_point_small([p.mean for p in points])
     centred = build.node("Sub", x, means)
@@ -247,16 +261,55 @@ def _novelty(build: Builder, x: str, space: NoveltySpace, output: str) -> None:
     columns = build.stored(
         [-2.0 * p.rows.T for p in points], np.int16, "columns of novelty"
     )
-    lengths = build.by_decision_point(
-        [(p.rows**2).sum(axis=1) for p in points], "lengths of novelty"
-    )
-    length = build.squared_length(y)
-    distances = build.node("Gemm", y, columns, lengths)
-    nearest, _ = build.nodes("TopK", [distances, [1]], ["", ""], largest=0)
-    root = build.node("Sqrt", build.node("Add", nearest, length))
-    product = build.node("Mul", build.node("Sqrt", outside), root)
+    squares = _apart(build, "novelty", y, y, columns, [p.rows for p in points])
+    product = build.node("Mul", build.node("Sqrt", outside), _nearest(build, squares))
     units = build.by_decision_point([p.unit for p in points])
-    build.node("Squeeze", build.node("Mul", product, units), [1], output=output)
+    score = build.node("Mul", product, units)
+    build.node("Squeeze", score, [1], output=names["novelty"])
+    _remoteness(build, y, columns, points, names["remoteness"])
+
+
+def _remoteness(
+    build: Builder,
+    y: str,
+    columns: str,
+    points: Sequence[NoveltyPoint],
+    output: str,
+) -> None:
+    """Nodes from whitened coordinates y (n, c) to the remoteness."""
+    weights = build.by_decision_point([p.weights for p in points])
+    weighted = build.node("Mul", y, weights)
+    # The rows are stored once: their weights stand beside those of y.
+    factor = build.node("Mul", weighted, weights)
+    rows = [p.rows * p.weights for p in points]
+    squares = _apart(build, "remoteness", weighted, factor, columns, rows)
+    nearness = build.by_decision_point_small([p.nearness for p in points])
+    root = _nearest(build, build.node("Mul", squares, nearness))
+    build.node("Squeeze", root, [1], output=output)
+
+
+def _apart(
+    build: Builder,
+    name: str,
+    y: str,
+    factor: str,
+    columns: str,
+    rows: Sequence[Floats],
+) -> str:
+    """Name of the squared distances (n, rows) of points y (n, c) to the rows of each
+    decision point, whose products with y are those of `factor` (n, c) with the
+    columns."""
+    lengths = build.by_decision_point(
+        [(r**2).sum(axis=1) for r in rows], f"lengths of {name}"
+    )
+    squares = build.node("Gemm", factor, columns, lengths)
+    return build.node("Add", squares, build.squared_length(y))
+
+
+def _nearest(build: Builder, squares: str) -> str:
+    """Name of the root (n, 1) of the smallest of squares (n, rows)."""
+    nearest, _ = build.nodes("TopK", [squares, [1]], ["", ""], largest=0)
+    return build.node("Sqrt", nearest)
 
 
 def label_tables(labels: Integers, classes: int) -> dict[str, Array]:
@@ -333,6 +386,7 @@ def _outputs(model: Fitted) -> dict[str, Any]:
     outputs["out_of_range"] = DoubleTensorType([None])
     if sequential:
         outputs["novelty"] = DoubleTensorType([None])
+        outputs["remoteness"] = DoubleTensorType([None])
     return outputs
 
 
@@ -391,4 +445,10 @@ def to_onnx(model: Fitted, info: ModelInfo) -> bytes:
     onnx.checker.check_model(proto, full_check=True)
     data: bytes = proto.SerializeToString(deterministic=True)
     onnx_file.check(onnx_file.read(data, "the exported model"), "the exported model")
-    return data
+    return with_digest(data)
+
+
+def with_digest(data: bytes) -> bytes:
+    """A model's bytes, and after them the digest by which a change is noticed."""
+    with_key = data + DIGEST
+    return with_key + hashlib.sha256(with_key).hexdigest().encode()

@@ -22,6 +22,7 @@ from edge.recording import Recording
 from edge.saving import save
 from edge.touch.layout import SkinLayout
 from export.__main__ import main as export_main
+from export.graph import DIGEST, with_digest
 
 # Each run draws the same examples, so only a change can turn a test red; `EXPLORE=1`
 # draws others. There are no deadlines, because a busy machine must not turn a test red.
@@ -231,6 +232,12 @@ def started(*arguments, **options) -> subprocess.Popen:
     words = [sys.executable, "-m", "edge", *map(str, arguments)]
     options = {"stderr": subprocess.PIPE, "text": True, **options}
     return subprocess.Popen(words, cwd=ROOT, **options)
+
+
+def sealed(proto):
+    """The bytes of an exported model that was changed, with a digest of its own."""
+    data, _, _ = proto.SerializeToString().partition(DIGEST)
+    return with_digest(data)
 
 
 PAPER = ("--features", "paper", "--projection", "pca", "--samples", "40")

@@ -1,4 +1,4 @@
-"""`make kills`: record, label and export are killed 60 times each.
+"""`make kills`: the commands that write files are killed 60 times each.
 
 Each run is killed at a moment that a seed draws: at any time of a whole run, or shortly
 after a file of its folder changed. Then every file must be whole, and the next start of
@@ -17,16 +17,22 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
+import onnx
+
 from edge import demo
+from edge.fake.touches import still
 from edge.recording import load
-from edge.saving import find
+from edge.saving import change_all, find, save
+from edge.skin import file as skinfile
 from edge.writing import PREFIX
 from tests.bench import tables
 from tests.bench.program import start
-from tests.conftest import ended
+from tests.conftest import ended, sealed
 from train.progress import bar
 
 EDGE = (sys.executable, "-m", "edge")
+TRAIN = (sys.executable, "-m", "train")
 EXPORT = (sys.executable, "-m", "export", "--quick", "--decision-points", "none")
 GOLDEN = Path(__file__).parent / "golden"
 PATIENCE_S = 120.0
@@ -34,6 +40,7 @@ MOST_CHANGES = 4
 CLOSE_S = 0.003
 """Every other kill comes at most so long after one of the first changes of a file."""
 OTHER_MODEL = "is of another model"
+ROBOT = "robot.onnx"
 
 
 @dataclass(frozen=True)
@@ -45,11 +52,13 @@ class Victim:
         command: given the folder.
         finished: what is wrong with the folder after the next run, "" if nothing; it
             is given what that run printed.
+        refuses: that run may say that there is nothing left to do.
     """
 
     prepare: Callable[[Path], None]
     command: Callable[[Path], Sequence[object]]
     finished: Callable[[Path, str], str]
+    refuses: bool = False
 
 
 def damage(folder):
@@ -59,8 +68,10 @@ def damage(folder):
         EdgeError: a recording is damaged.
     """
     for path in folder.glob("**/*.npz"):
-        if path.name != "golden.npz":
+        if not path.name.startswith("golden"):
             load(path)
+    if (folder / ROBOT).exists():
+        return proven(folder, "")
     complaint = agreeing(folder, "") if (folder / "model.onnx").exists() else ""
     return "" if OTHER_MODEL in complaint else complaint
 
@@ -88,6 +99,10 @@ def relabelled(folder):
     return [*EDGE, "label", "--set", "object=crate", "--yes", folder]
 
 
+def undoing(folder):
+    return [*EDGE, "label", "--undo", folder]
+
+
 def all_or_none(folder, printed):
     """The next start finished the change of labels: all have it."""
     changed = [load(path).labels["object"] == "crate" for path in find([folder])]
@@ -113,9 +128,92 @@ def exporting(folder):
     return [*EXPORT, "--data", folder / "touches", "--out", folder, "--jobs", 1, *words]
 
 
+def before_undo(folder):
+    copied(folder)
+    change_all({path: {"object": "crate"} for path in find([folder])})
+
+
+def taken_back(folder, printed):
+    """The next start finished what took the change back: no file has it."""
+    changed = [load(path).labels["object"] == "crate" for path in find([folder])]
+    return f"{sum(changed)} of {len(changed)} files changed" if any(changed) else ""
+
+
+def installing(folder):
+    new = ("--golden", GOLDEN / "golden.npz", "--to", folder / ROBOT)
+    return [*EDGE, "install", folder / "new.onnx", *new]
+
+
+def returning(folder):
+    return [*EDGE, "install", "--back", "--to", folder / ROBOT]
+
+
+def before_install(folder):
+    """A robot runs a model, and another one is at hand."""
+    model = onnx.load(GOLDEN / "model.onnx")
+    for name in ("former", "new"):
+        model.doc_string = name
+        (folder / "new.onnx").write_bytes(sealed(model))
+        if name == "former":
+            ended(*installing(folder))
+
+
+def before_return(folder):
+    before_install(folder)
+    ended(*installing(folder))
+
+
+def proven(folder, printed):
+    """The model that runs has its golden file beside it, and the next run kept both."""
+    result = ended(*EDGE, "verify", "--model", folder / ROBOT, timeout=PATIENCE_S)
+    if result.returncode or not printed:
+        return result.stderr if result.returncode else ""
+    models = {path.read_bytes() for path in folder.glob(f"{ROBOT}*")}
+    return "" if len(models) == 2 else f"{len(models)} models of 2 are there"
+
+
+def before_calibration(folder):
+    skin = shutil.copy(skinfile.shipped("cody"), folder / "skin.toml")
+    save(folder / "still.npz", still(skinfile.load(skin), 1.0))
+
+
+def calibrating(folder):
+    skin = ("--skin", folder / "skin.toml", "--fake", folder / "still.npz")
+    return [*EDGE, "calibrate", *skin, "--frames", 20]
+
+
+def calibrated(folder, printed):
+    skins = [skinfile.load(path) for path in folder.glob("skin.toml*")]
+    return "" if len(skins) == 2 and skins[0].calibration else "not calibrated"
+
+
+def before_import(folder):
+    (folder / "in").mkdir()
+    for path in demo.recordings():
+        touch = load(path)
+        np.save(
+            folder / "in" / f"{path.stem}.npy", touch.frames.reshape(len(touch.t), -1)
+        )
+
+
+def importing(folder):
+    words = ["--rate", 100, "--shape", "16x24", "--axis", 1, "--strict"]
+    return [*TRAIN, "import", "csv", folder / "in", "--out", folder / "out", *words]
+
+
+def imported(folder, printed):
+    count = len(find([folder / "out"]))
+    return "" if count == len(demo.recordings()) else f"{count} recordings"
+
+
 VICTIMS = {
     "record": Victim(lambda folder: None, recorded, all_recorded),
     "label --set": Victim(copied, relabelled, all_or_none),
+    "label --undo": Victim(before_undo, undoing, taken_back, refuses=True),
+    "install": Victim(before_install, installing, proven),
+    "install --back": Victim(before_return, returning, proven),
+    "calibrate": Victim(before_calibration, calibrating, calibrated),
+    "import": Victim(before_import, importing, imported),
     "export": Victim(before_exporting, exporting, agreeing),
 }
 
@@ -196,7 +294,7 @@ def killed_once(victim, most_changes, delay_s):
         left = temporaries(folder)
         complaint = damage(folder)
         second_run = ended(*command, timeout=PATIENCE_S)
-        if second_run.returncode:
+        if second_run.returncode and not victim.refuses:
             complaint += second_run.stderr
         complaint += victim.finished(folder, second_run.stderr)
         remaining = [path for path in left if path.exists()]
@@ -225,11 +323,13 @@ def deaths_of(name, victim, count):
         yield killed_once(victim, changes, delay_s)
 
 
-def measure(count):
+def measure(count, only):
     """Kill, and write the table; 1 if a file was damaged or a next start failed."""
     rows = []
     complaints = []
     for name, victim in VICTIMS.items():
+        if only not in name:
+            continue
         deaths = list(deaths_of(name, victim, count))
         wrong = [death.complaint for death in deaths if death.complaint]
         complaints += [f"{name}: {text}" for text in wrong]
@@ -249,4 +349,9 @@ def measure(count):
 
 
 if __name__ == "__main__":
-    start(measure, __doc__, ("--count", 60, "kills of each command"))
+    start(
+        measure,
+        __doc__,
+        ("--count", 60, "kills of each command"),
+        ("--only", "", "commands whose names contain this"),
+    )

@@ -86,7 +86,8 @@ def fit(data: DataSet | str | Path | Sequence[str | Path], **options: Any) -> Fi
 
     Options you pass are held fixed. The others are chosen for each task among the
     candidates of `train.choose.choose`: the features and projection of the smallest model
-    within one standard error of the best in cross-validation, with the scaling,
+    within one standard error of the best in cross-validation (the most accurate one
+    where fewer than 100 single trials are left out), with the scaling,
     shrinkage, components and k that are best there.
 
     Args:
@@ -137,8 +138,9 @@ def fit(data: DataSet | str | Path | Sequence[str | Path], **options: Any) -> Fi
     settings = choose(loaded, y, fixed)
     measured = loaded.dataset.with_kernels(settings.window_s)
     notes = [*doubts, *lacking(loaded.dataset, fixed.tasks), *loaded.notes]
-    notes += [*settings.notes, *_of_unseen(settings, fixed), *leaks(measured, y)]
+    notes += [*_of_unseen(settings, fixed), *leaks(measured, y)]
     points = decision_points(measured, settings, fixed, notes)
+    notes += settings.notes
     if len(points) < 2:
         settings = replace(settings, early=None)
     dataset = measured.of(sorted(settings.features()))
@@ -214,7 +216,8 @@ def calibrate(
         widths=dataset.widths(options.samples),
         early=settings.early,
     )
-    return classifier.fit(at_points, y, settings.folds, settings.without)
+    grouped = [t for t, chosen in settings.chosen.items() if chosen.left_out != TRIAL]
+    return classifier.fit(at_points, y, settings.folds, settings.without, grouped)
 
 
 def _of_unseen(settings: Settings, options: FitOptions) -> list[str]:

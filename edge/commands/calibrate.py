@@ -8,6 +8,7 @@ touched, or has taxels that cannot be read or are saturated, is refused.
 import argparse
 import math
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 import numpy as np
 
@@ -21,6 +22,7 @@ from edge.skin.file import SkinFile, TaxelCalibration, load
 from edge.skin.loop import Loop
 from edge.skin.skin import Skin
 from edge.touch.region import find_regions
+from edge.writing import remove_leftovers
 
 FRAMES = 1000
 """As many as the paper's lab averaged for its baseline."""
@@ -283,6 +285,7 @@ def run(arguments: argparse.Namespace) -> int:
             "give --skin skin.toml, the file into which the calibration is written"
         )
     former = load(arguments.skin).calibration
+    remove_leftovers(Path(arguments.skin).parent)
     with open_skin(arguments, calibrated=False) as opened:
         LOG.info("measuring; keep everything off the skin")
         measured = measure(opened.skin, arguments.frames, opened.lasts_s)

@@ -62,7 +62,8 @@ def faults(file: SkinFile) -> Iterator[str]:
         yield (
             f"{counted(len(deaf), 'taxel')} deaf, such as {list(deaf[0])}: the dead band "
             f"reaches the threshold of {file.layout.threshold_counts} counts; calibrate "
-            "again with nothing on the skin, or raise threshold_counts"
+            "again with nothing on the skin, raise threshold_counts, or list broken "
+            "taxels under dead in [signal]"
         )
     signal = file.signal
     if onset == 0 and signal.dead_band_sigma == 0.0 and signal.dead_band_counts == 0:

@@ -1,13 +1,14 @@
 """Put a new model in the place of the one that the robot runs, or take it back.
 
 Verifies the model with its golden file in every engine that is installed, and against
-the skin file if one is given. The former model is kept beside the new one, which takes
-its place in one step. With --service, the service is restarted, and the former model
-comes back by itself if the service has not run for a minute.
+the skin file if one is given. The model that ran is kept as the former one beside the
+new one, which takes its place in one step; --back exchanges the two. A golden file has
+its model's version in its name. With --service, the service is restarted, and the
+former model comes back by itself if the service has not run for a minute.
 """
 
 import argparse
-import os
+import hashlib
 import subprocess
 import time
 from collections.abc import Callable
@@ -17,13 +18,15 @@ from edge.commands.output import LOG, Output
 from edge.errors import EdgeError, InputError
 from edge.files import read_bytes, refusing
 from edge.model.model import LARGEST_BYTES, Model
-from edge.model.verify import verify
+from edge.model.verify import golden_of, verify
 from edge.skin.file import load
 from edge.touch.differences import differences
-from edge.writing import write_whole
+from edge.writing import remove_leftovers, write_whole
 
 FORMER = ".former"
-"""Ends the name of the model that was replaced, and of its golden file."""
+"""Ends the name of the model that was replaced."""
+LEAVING = ".leaving"
+"""Ends the name of a copy of the model that is being replaced."""
 PROVE_S = 60.0
 """How long a service must run with a new model."""
 LOOK_S = 2.0
@@ -54,7 +57,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--back",
         action="store_true",
-        help="bring the former model back",
+        help="exchange the model for the former one",
     )
 
 
@@ -62,6 +65,8 @@ def run(arguments: argparse.Namespace) -> int:
     """Install, or go back; 1 if the new model did not prove itself."""
     output = Output.of(arguments)
     target = arguments.to
+    remove_leftovers(target.parent)
+    finish(target)
     if arguments.back:
         go_back(target)
         restart(arguments.service)
@@ -116,30 +121,55 @@ def prove(path: Path, golden: Path, skin: str | None) -> None:
             LOG.warning(f"{path}: {sentence}")
 
 
-def former_of(path: Path) -> Path:
-    """The path of the file that was replaced."""
-    return path.with_name(path.name + FORMER)
+def beside(target: Path, end: str) -> Path:
+    """The path of a file whose name is the model's with another end."""
+    return target.with_name(target.name + end)
 
 
 def place(model: Path, golden: Path, target: Path) -> None:
-    """Put the model and its golden file in place, and keep the former ones."""
-    for source, goal in ((golden, target.with_name("golden.npz")), (model, target)):
-        data = read_bytes(source, LARGEST_BYTES)
-        _keep_former(goal, data)
-        _write(goal, data)
+    """Put the model and its golden file in place, and keep the model that runs."""
+    data = read_bytes(model, LARGEST_BYTES)
+    _write(_golden_of(target, data), read_bytes(golden, LARGEST_BYTES))
+    _replace(target, data)
 
 
-def _keep_former(goal: Path, data: bytes) -> None:
-    """Copy the file that other bytes are to replace, under a longer name."""
-    if goal.is_file():
-        former = read_bytes(goal, LARGEST_BYTES)
-        if former != data:  # installed twice, it would be its own way back
-            _write(former_of(goal), former)
+def _golden_of(target: Path, data: bytes) -> Path:
+    """The golden file of a model with these bytes."""
+    return golden_of(target, hashlib.sha256(data).hexdigest()[:8])
+
+
+def _replace(target: Path, data: bytes) -> None:
+    """Let a model take the place of the one that runs, which becomes the former one."""
+    if target.is_file():
+        running = read_bytes(target, LARGEST_BYTES)
+        if running == data:  # installed twice, it would be its own way back
+            return
+        _write(beside(target, LEAVING), running)
+    _write(target, data)
+    finish(target)
+
+
+def finish(target: Path) -> None:
+    """Finish an exchange that was interrupted: what has left becomes the former model,
+    unless it still runs."""
+    leaving = beside(target, LEAVING)
+    former = beside(target, FORMER)
+    if not leaving.is_file():
+        return
+    running = read_bytes(target, LARGEST_BYTES)
+    if running == read_bytes(leaving, LARGEST_BYTES):
+        leaving.unlink()
+        return
+    if former.is_file():
+        dropped = read_bytes(former, LARGEST_BYTES)
+        if dropped != running:
+            _golden_of(target, dropped).unlink(missing_ok=True)
+    leaving.replace(former)
 
 
 def _return_by_itself(target: Path) -> bool:
     """Bring the former model back; whether there is one."""
-    if not former_of(target).is_file():
+    if not beside(target, FORMER).is_file():
         return False
     go_back(target)
     LOG.error(f"{target}: the former model is back")
@@ -147,18 +177,15 @@ def _return_by_itself(target: Path) -> bool:
 
 
 def go_back(target: Path) -> None:
-    """Bring the former model and its golden file back.
+    """Exchange the model for the former one.
 
     Raises:
         InputError: there is no former model.
     """
-    if not former_of(target).is_file():
+    former = beside(target, FORMER)
+    if not former.is_file():
         raise InputError(f"{target}: has no former model to go back to")
-    for goal in (target.with_name("golden.npz"), target):
-        former = former_of(goal)
-        if former.is_file():
-            _write(goal, read_bytes(former, LARGEST_BYTES))
-            os.unlink(former)
+    _replace(target, read_bytes(former, LARGEST_BYTES))
 
 
 def _write(goal: Path, data: bytes) -> None:

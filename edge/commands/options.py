@@ -12,9 +12,8 @@ if TYPE_CHECKING:
     from edge.model.model import Model
 
 NOISE_COUNTS = 0.7
-"""Noise of the fake skins that commands open, below that from which a chip that always
-serves the same bytes is stuck: a fake may be calibrated with noise, and then played
-without."""
+"""Noise of the fake skins that commands open. One that is calibrated with noise and then
+played without is taken for frozen."""
 
 
 def within(kind: type, low: float, high: float) -> Callable[[str], float]:

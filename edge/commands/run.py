@@ -60,16 +60,17 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--keep-if",
-        default="unsure,unknown",
+        default="unsure,unknown,unusual",
         metavar="WHY",
-        help="which touches are kept: unsure, unknown, all (default: %(default)s)",
+        help="which touches are kept: unsure, unknown, unusual, all (default: %(default)s)",
     )
     parser.add_argument(
         "--keep-mb",
         type=within(float, 1.0, 1e6),
         default=200.0,
         metavar="MB",
-        help="most megabytes of kept touches; the oldest go first (default: %(default)g)",
+        help="most megabytes of kept touches; the oldest without a label go first "
+        "(default: %(default)g)",
     )
 
 

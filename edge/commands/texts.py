@@ -61,9 +61,15 @@ def _onset(line: Line) -> str:
     return _at(line["onset_s"], f"contact{_contact(line)}")
 
 
+def _label(line: Line) -> str:
+    """The label of a decision, or why it has none."""
+    unnamed = "unknown" if "unknown" in line["flags"] else "out of range"
+    return unnamed if line["label"] is None else str(line["label"])
+
+
 def _decision(line: Line) -> str:
     """The time of a decision, its task, label, confidence and flags."""
-    label = "out of range" if line["label"] is None else line["label"]
+    label = _label(line)
     notes = [", ".join(line["flags"])] if line["flags"] else []
     if "unusual" in line:
         notes.append(line["unusual"])
@@ -76,7 +82,7 @@ def _decision(line: Line) -> str:
     number = _contact(line)
     contact = number and f"{number}:"
     text = f"{time:8.3f} s {contact} {line['task']:<10} {label:<16}"
-    if line["confidence"] is not None:
+    if line["confidence"]:
         text += f" {bar(line['confidence'])} {line['confidence']:4.0%}"
     return f"{text}  ({'; '.join(notes)})" if notes else text
 
@@ -110,7 +116,8 @@ def _aside(line: Line) -> str:
         return _at(line["t"], "all taxels are followed again")
     places = ", ".join(f"({row}, {col})" for row, col in taxels[:MOST_PLACES])
     more = " ..." if len(taxels) > MOST_PLACES else ""
-    return _at(line["t"], f"ignored as still: taxels {places}{more}")
+    remedy = "free them, or list broken ones under dead in [signal]"
+    return _at(line["t"], f"ignored: taxels {places}{more}; {remedy}")
 
 
 def _end(line: Line) -> str:

@@ -11,7 +11,7 @@ from typing import Any
 from edge.commands.options import add_engine
 from edge.commands.output import LOG, Output
 from edge.model.model import Model
-from edge.model.verify import Check, verify
+from edge.model.verify import Check, golden_of, verify
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
@@ -19,8 +19,8 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--model", required=True, help="model.onnx")
     parser.add_argument(
         "--golden",
-        required=True,
-        help="golden.npz, written together with the model",
+        help="golden.npz, written together with the model (default: that which `install` "
+        "put beside it)",
     )
     add_engine(parser)
 
@@ -28,7 +28,8 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Print one line per result; 1 if one differs."""
     output = Output.of(arguments)
-    checks = verify(Model(arguments.model, arguments.engine), arguments.golden)
+    model = Model(arguments.model, arguments.engine)
+    checks = verify(model, arguments.golden or golden_of(model.path, model.version))
     width = max(len(check.name) for check in checks)
     for check in checks:
         output.event(_event(check), _text(check, width))

@@ -2,7 +2,6 @@
 with them."""
 
 from collections.abc import Mapping, Sequence
-from itertools import product
 
 import numpy as np
 
@@ -11,7 +10,7 @@ from edge.arrays import Array
 Factors = Mapping[str, Sequence[int]]
 """{factor: the index of its label for each label of the product}. A product, such as
 category, has one label for each pair of its two factors' labels, such as mobility and
-softness."""
+softness, that was met in training."""
 
 
 def agreed(
@@ -48,10 +47,12 @@ def agreed(
     return labels, nearest
 
 
-def product_label(factors: Factors, indices: Mapping[str, int]) -> int:
-    """The index of the product's label for the factors' labels (indices)."""
+def product_label(factors: Factors, indices: Mapping[str, int]) -> int | None:
+    """The index of the product's label for the factors' labels (indices); None where
+    this pair was never met."""
     pairs = list(zip(*factors.values(), strict=True))
-    return pairs.index(tuple(indices[factor] for factor in factors))
+    pair = tuple(indices[factor] for factor in factors)
+    return pairs.index(pair) if pair in pairs else None
 
 
 def factors_fit(
@@ -59,19 +60,22 @@ def factors_fit(
     labels: Mapping[str, tuple[str, ...]],
     task: str,
 ) -> bool:
-    """Whether each pair of the factors' labels is one label of the task.
+    """Whether each label of the task is a pair of the factors' labels, and each of
+    these is in one.
 
     Args:
         factors: of the task.
         labels: {task: its labels} of a model.
         task: the product.
     """
-    ranges = [range(len(labels[factor])) for factor in factors if factor in labels]
     lengths = {len(indices) for indices in factors.values()}
-    if len(ranges) != 2 or lengths != {len(labels[task])}:
+    if len(factors) != 2 or lengths != {len(labels[task])}:
         return False
+    for factor, indices in factors.items():
+        if {*indices} != {*range(len(labels.get(factor, ())))}:
+            return False
     pairs = list(zip(*factors.values(), strict=True))
-    if sorted(pairs) != list(product(*ranges)):
+    if len({*pairs}) < len(pairs):
         return False
     first, second = (labels[factor] for factor in factors)
     return _named_after(pairs, first, second, labels[task])

@@ -1,6 +1,6 @@
 """What a model's file says beside its graph: its tasks, its features, and its calibration:
-how sure a decision is, when it may come early, and which contacts are unlike everything
-in training."""
+how sure a decision is, when it may come early, and which contacts are unusual or of
+things that were never met."""
 
 from __future__ import annotations
 
@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING
 
 from edge.arrays import Floats
 from edge.elementary import log, logistic
-from edge.errors import InputError
 from edge.touch.features import feature_vector, widths
 from edge.touch.layout import SkinLayout, for_device
 from edge.touch.still import WatchfulTracker
@@ -23,25 +22,7 @@ if TYPE_CHECKING:
     from edge.touch.kernels import KernelTable
 
 METADATA_KEY = "edge-classify"
-FORMAT = 7
-UNKNOWN = "unknown"
-"""The label of a contact that is unlike everything in training."""
-NOVELTY_RATE = 0.02
-"""Rate at which contacts with trained objects may be called unknown. Such answers are
-counted among the certified errors."""
-TEST_SHARE = 0.5
-"""Part of the risk that the tests on calibration trials take. The rest covers the
-exported model, which errs more or less often than the folds' models do on average."""
-
-
-def check_rate(value: float, name: str) -> None:
-    """Refuse a rate outside (0, 1).
-
-    Raises:
-        InputError: the sentence begins with `name`.
-    """
-    if not 0.0 < value < 1.0:
-        raise InputError(f"{name} must be above 0 and below 1, not {value:g}")
+FORMAT = 8
 
 
 @dataclass(frozen=True)
@@ -77,33 +58,47 @@ class Task:
 
 @dataclass(frozen=True)
 class Novelty:
-    """When a contact is unlike everything in training.
+    """When a contact is unusual: unlike all in training, whatever the thing.
 
     The graph scores every contact in a space of its own (`train.model.novelty`).
 
     Attributes:
-        task: with most labels. It names no label for an unknown contact: a new object
-            can still be called soft or movable.
-        rates: shares of trained contacts that score higher than the limits, falling
-            from one half.
-        limits: (decision points, rates) of the score.
+        typical: (decision points,) scores that half of trained contacts exceed.
+        limits: (decision points,) scores that few of them exceed.
     """
 
-    task: str
-    rates: tuple[float, ...]
-    limits: tuple[tuple[float, ...], ...]
-
-    def rate(self, decision_point: int, score: float) -> float:
-        """The smallest novelty rate at which a score counts as unknown; 1 if it never
-        does."""
-        limits = zip(self.rates, self.limits[decision_point], strict=True)
-        return min((rate for rate, limit in limits if score > limit), default=1.0)
+    typical: tuple[float, ...]
+    limits: tuple[float, ...]
 
     def excess(self, decision_point: int, score: float) -> float:
-        """The logarithm of a score over that of half of the trained contacts; 0 below
-        it."""
-        typical = self.limits[decision_point][0]
+        """The logarithm of a score over the typical one; 0 below it."""
+        typical = self.typical[decision_point]
         return log(score / typical) if score > typical > 0.0 else 0.0
+
+
+@dataclass(frozen=True)
+class Remoteness:
+    """When a thing is unknown: far from all in training by what tells things apart.
+
+    Attributes:
+        limits: (decision points,) scores that few things in training exceed.
+        middles: (decision points,) scores at which a thing is as likely known as not.
+        slopes: (decision points,) by which the odds fall with the score's logarithm.
+        worth: shares of things that were left out, see `train.model.never_met`; empty
+            where none could be.
+    """
+
+    limits: tuple[float, ...]
+    middles: tuple[float, ...]
+    slopes: tuple[float, ...]
+    worth: Mapping[str, float] = field(default_factory=dict)
+
+    def known(self, decision_point: int, score: float) -> float:
+        """Probability, 0 to 1, that the thing is one of those in training."""
+        if score <= 0.0:
+            return 1.0
+        log_odds = log(self.middles[decision_point] / score)
+        return logistic(self.slopes[decision_point] * log_odds)
 
 
 def margin(distances: Sequence[float], label: int) -> float:
@@ -129,7 +124,7 @@ class StoppingRule:
     """Decide at the first decision point that is sure enough, and at the last one in
     any case.
 
-    A contact that is unknown there waits until it no longer is, or for the full window.
+    An unusual contact waits until it no longer is, or for the full window.
 
     Attributes:
         error: certified: decisions are wrong at most this often.
@@ -144,11 +139,6 @@ class StoppingRule:
     confidence: float
     last: int
 
-    @property
-    def fixed(self) -> bool:
-        """Whether the rule waits for a fixed window."""
-        return self.confidence > 1.0
-
 
 @dataclass(frozen=True)
 class Stopping:
@@ -159,14 +149,12 @@ class Stopping:
             label is right is the logistic function of slope * `margin` + intercept -
             doubt * `Novelty.excess`.
         slope, intercept, doubt: the same of all decision points together, for the
-            rules. A point's own curve seldom rises high early, so with it the rules
-            would wait on clear contacts too.
-        rules: in the order of rising error. Mean times fall along them, except from a
-            factor's own rules to those that it shares with its product (see
-            `edge.model.agreement`).
+            rules.
+        rules: in the order of rising error. Mean times never rise along them.
         trials: number of trials that certify the rules.
         wrong: number of these trials that are decided wrongly at the full window.
         risk: probability that a rule errs more often than its certificate says.
+        remoteness: of the task that names things, and none that is unknown; else None.
     """
 
     slopes: tuple[float, ...]
@@ -179,11 +167,7 @@ class Stopping:
     trials: int
     wrong: int
     risk: float
-
-    @property
-    def smallest_error(self) -> float:
-        """The smallest error rate that is certified."""
-        return self.rules[0].error
+    remoteness: Remoteness | None = None
 
     def confidence(
         self,
@@ -191,6 +175,7 @@ class Stopping:
         distances: Sequence[float],
         label: int,
         excess: float,
+        remoteness: float = 0.0,
     ) -> float:
         """Probability, 0 to 1, that a label is right.
 
@@ -199,15 +184,14 @@ class Stopping:
             distances: (labels,) of `edge.model.Decision.label_distances`.
             label: its index.
             excess: the contact's `Novelty.excess`.
+            remoteness: of the contact.
         """
         log_odds = self.slopes[decision_point] * margin(distances, label)
         log_odds += self.intercepts[decision_point]
-        return logistic(log_odds - self.doubts[decision_point] * excess)
-
-    def rule(self, error: float) -> StoppingRule | None:
-        """The fastest rule that is certified for an error rate; or None."""
-        certified = [rule for rule in self.rules if rule.error <= error]
-        return certified[-1] if certified else None
+        likely = logistic(log_odds - self.doubts[decision_point] * excess)
+        if self.remoteness is None:
+            return likely
+        return likely * self.remoteness.known(decision_point, remoteness)
 
 
 @dataclass(frozen=True)
@@ -248,8 +232,15 @@ class ModelInfo:
     usual: Mapping[str, Sequence[float]] = field(default_factory=dict)
     """{feature: the least and the greatest mean over the full window of nearly all
     training trials}; empty without decision points."""
-    several: float = 1.0
-    """Share of the training trials with a second region beside the contact."""
+    several_labels: Sequence[str] = ()
+    """Labels of the task with most labels whose training trials often have a second region
+    beside the contact."""
+    still_s: Sequence[float] = ()
+    """(dof,) seconds for which each joint stood still in nearly all training trials, at
+    the longest."""
+    speeds: Sequence[float] = ()
+    """Least and greatest speed of the joints before onset, in radians a second, for
+    which the training trials speak; empty where not known."""
 
     @property
     def widths(self) -> tuple[int, ...]:

@@ -4,7 +4,9 @@ import json
 
 from edge.model.info import FORMAT, ModelInfo
 
-OPTIONAL = "decision_points_s stopping novelty joints kernels name trials usual".split()
+OPTIONAL = (
+    "decision_points_s stopping novelty joints kernels name trials usual speeds".split()
+)
 """Keys that are left out where they would be empty."""
 
 

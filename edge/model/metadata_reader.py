@@ -6,7 +6,15 @@ from collections.abc import Iterator, Sequence
 
 from edge.config import ConfigTable, parse_json, short_text
 from edge.errors import InputError, about
-from edge.model.info import FORMAT, ModelInfo, Novelty, Stopping, StoppingRule, Task
+from edge.model.info import (
+    FORMAT,
+    ModelInfo,
+    Novelty,
+    Remoteness,
+    Stopping,
+    StoppingRule,
+    Task,
+)
 from edge.touch.contact import feature_types
 from edge.touch.feature import KERNELS
 from edge.touch.layout import SkinLayout
@@ -57,9 +65,12 @@ def _read(meta: ConfigTable) -> ModelInfo:
     novelty = None
     if points:
         rules = meta.table("stopping")
+        count = len(points)
         for task in rules.raw:
-            stopping[task] = read_stopping(rules.table(task), len(points))
-        novelty = read_novelty(meta.table("novelty"), len(points))
+            stopping[task] = read_stopping(rules.table(task), count)
+        table = meta.table("novelty")
+        typical = table.numbers("typical", count, low=0.0)
+        novelty = Novelty(typical, table.numbers("limits", count, low=0.0))
     kernels = {}
     if not KERNELS.keys().isdisjoint(names):
         from edge.touch.kernels import read_tables  # few models have any
@@ -68,7 +79,7 @@ def _read(meta: ConfigTable) -> ModelInfo:
     info = ModelInfo(
         tasks=task_of,
         layout=layout,
-        debounce=tracking.whole("debounce", allowed=range(1, 1001)),
+        debounce=tracking.whole("debounce", allowed=range(1, 101)),
         window_s=meta.number("window_s", low=0.0, high=3600.0, open_low=True),
         samples=meta.whole("samples", allowed=range(2, 10_001)),
         features=names,
@@ -86,7 +97,9 @@ def _read(meta: ConfigTable) -> ModelInfo:
         name=meta.text("name", "", empty=True),
         trials=meta.texts("trials", ()),
         usual=_usual(meta, names),
-        several=meta.number("several", 1.0, low=0.0, high=1.0),
+        several_labels=meta.texts("several_labels", ()),
+        still_s=meta.numbers("still_s", default=()),
+        speeds=meta.numbers("speeds", 2) if meta.has("speeds") else (),
     )
     tracking.refuse_unknown()
     return info
@@ -101,7 +114,7 @@ def _task(table: ConfigTable) -> Task:
     task = Task(
         labels,
         k=table.whole("k", allowed=range(1, 1 << 31)),
-        components=table.whole("components", allowed=range(1 << 31)),
+        components=table.whole("components", allowed=range(1, 1 << 31)),
         scaling=table.text("scaling"),
         accuracy=table.number("accuracy", low=0.0, high=1.0),
         projection=table.text("projection"),
@@ -121,11 +134,14 @@ def read_stopping(table: ConfigTable, points: int) -> Stopping:
         InputError: the table is damaged.
     """
     trials = table.whole("trials", allowed=range(1, 1 << 31))
+    remoteness = None
+    if table.has("remoteness"):
+        remoteness = read_remoteness(table.table("remoteness"), points)
     return Stopping(
-        slopes=table.numbers("slopes", points, low=0.0, open_low=True),
+        slopes=table.numbers("slopes", points, low=1e-12, high=1e12),
         intercepts=table.numbers("intercepts", points),
         doubts=table.numbers("doubts", points, low=0.0),
-        slope=table.number("slope", low=0.0, open_low=True),
+        slope=table.number("slope", low=1e-12, high=1e12),
         intercept=table.number("intercept"),
         doubt=table.number("doubt", low=0.0),
         rules=tuple(
@@ -140,29 +156,23 @@ def read_stopping(table: ConfigTable, points: int) -> Stopping:
         trials=trials,
         wrong=table.whole("wrong", allowed=range(trials + 1)),
         risk=table.number("risk", low=0.0, high=1.0, open_low=True),
+        remoteness=remoteness,
     )
 
 
-def read_novelty(table: ConfigTable, points: int) -> Novelty:
-    """The limits of novelty, of a model with this number of decision points.
+def read_remoteness(table: ConfigTable, points: int) -> Remoteness:
+    """The doubt about names, of a model with this number of decision points.
 
     Raises:
         InputError: the table is damaged.
     """
-    rates = table.numbers("rates")
-    rows = table.get("limits")
-    if not rates or not isinstance(rows, list | tuple) or len(rows) != points:
-        raise table.fail("limits", f"{points} rows of a number for each of the rates")
-    if sorted({0.0, *rates, 1.0}) != [0.0, *rates[::-1], 1.0]:
-        raise table.fail("rates", "numbers between 0 and 1 that fall")
-    limits = []
-    for row in rows:
-        line = ConfigTable({"limits": row}, table.where, table.prefix)
-        numbers = line.numbers("limits", len(rates))
-        if sorted([0.0, *numbers]) != [0.0, *numbers]:
-            raise table.fail("limits", "rows of numbers from 0 on that rise")
-        limits.append(numbers)
-    return Novelty(table.text("task"), rates, tuple(limits))
+    worth = table.table("worth")
+    return Remoteness(
+        limits=table.numbers("limits", points, low=0.0),
+        middles=table.numbers("middles", points, low=1e-9),
+        slopes=table.numbers("slopes", points, low=0.0),
+        worth={name: worth.number(name, low=0.0, high=1.0) for name in worth.raw},
+    )
 
 
 def _usual(meta: ConfigTable, names: Sequence[str]) -> dict[str, Sequence[float]]:
@@ -227,7 +237,5 @@ def _points_fit(info: ModelInfo) -> bool:
     """Whether decision points rise to the window, and each task has its rules."""
     points = info.decision_points_s
     rising = sorted({0.0, *points}) == [0.0, *points]
-    if not rising or points[-1] != info.window_s:
-        return False
-    named = info.novelty is not None and info.novelty.task in info.tasks
-    return named and info.stopping.keys() == info.tasks.keys()
+    ends = points[-1] == info.window_s
+    return rising and ends and info.stopping.keys() == info.tasks.keys()

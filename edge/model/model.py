@@ -47,8 +47,9 @@ class Decision(NamedTuple):
             agree.
         out_of_range: the features lie so far outside those of the training trials that
             the model cut them off; see `train.model.projection.Grid`.
-        novelty: how unlike all training trials the features are (see
-            `edge.model.info.Novelty`), of a model with decision points.
+        novelty, remoteness: how unlike all training trials the features are, and how
+            far from all known things (see `edge.model.info`), of a model with decision
+            points.
     """
 
     label: str
@@ -61,6 +62,7 @@ class Decision(NamedTuple):
     label_distances: Floats | None = None
     out_of_range: bool = False
     novelty: float = 0.0
+    remoteness: float = 0.0
 
 
 class Model:
@@ -273,6 +275,7 @@ class Model:
         if label >= len(shares) or not 0.0 <= shares[label] <= 1.0:
             raise self._broken(f"{task} is answered by label {label} of {len(shares)}")
         novelty = float(answers.get("novelty", 0.0))
+        remoteness = float(answers.get("remoteness", 0.0))
         confidence = None
         if self.info.novelty is not None:
             confidence = self.info.stopping[task].confidence(
@@ -280,6 +283,7 @@ class Model:
                 distances.tolist(),
                 label,
                 self.info.novelty.excess(point, novelty),
+                remoteness,
             )
         return Decision(
             label=self.info.tasks[task].labels[label],
@@ -292,6 +296,7 @@ class Model:
             label_distances=distances,
             out_of_range=bool(answers["out_of_range"] > 0.0),
             novelty=novelty,
+            remoteness=remoteness,
         )
 
     def _broken(self, reason: str) -> InputError:
@@ -309,18 +314,18 @@ class Model:
             return OutOfRange(
                 "the features are too large to be scaled; check the skin's units"
             )
-        feature = np.repeat(self.info.features, self.info.widths)[finite.argmin()]
-        return OutOfRange(
-            f"value {finite.argmin()} of the features, of {feature}, is not finite"
-        )
+        place = finite.argmin()
+        feature = np.repeat(self.info.features, self.info.widths)[place]
+        return OutOfRange(f"value {place} of the features, of {feature}, is not finite")
 
 
 def _outputs(info: ModelInfo) -> dict[str, tuple[str, list[int]]]:
     """{output: its type, and its shape for one vector} of a graph with this
     metadata."""
-    outputs: dict[str, tuple[str, list[int]]] = {"out_of_range": ("tensor(double)", [])}
+    scores = ["out_of_range"]
     if info.decision_points_s:
-        outputs["novelty"] = "tensor(double)", []
+        scores += ["novelty", "remoteness"]
+    outputs = dict.fromkeys(scores, ("tensor(double)", list[int]()))
     for task, entry in info.tasks.items():
         outputs |= {
             f"{task}_label": ("tensor(int64)", []),

@@ -6,8 +6,8 @@ to nothing outside itself and uses only the operators of an exported model, in a
 of its size.
 """
 
+import hashlib
 from collections import defaultdict
-from collections.abc import Iterator
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
@@ -45,6 +45,10 @@ TENSOR_NAME = 8
 EXTERNAL_DATA = 13
 DATA_LOCATION = 14
 """Fields of a TensorProto."""
+
+DIGITS = 64
+"""At the end of an exported model: the SHA-256 of all bytes before, which no model of an
+earlier version has."""
 
 UNUSUAL = "functions, inner graphs or sparse tensors"
 
@@ -90,33 +94,22 @@ def _varint(data: memoryview, at: int) -> tuple[int, int]:
     raise ValueError("a number of more than 64 bits")
 
 
-def fields_of(value: memoryview) -> Iterator[tuple[int, Any, memoryview]]:
-    """Number, value and bytes of each field of a protobuf message (protobuf.dev,
-    Encoding)."""
+def message_of(value: memoryview) -> Message:
+    """The values of a protobuf message's fields (protobuf.dev, Encoding)."""
+    fields: Message = defaultdict(list)
     at = 0
     while at < len(value):
-        first = at
         key, at = _varint(value, at)
-        size = {1: 8, 5: 4}.get(key & 7)
-        if key & 7 == 0:
-            number, at = _varint(value, at)
-            yield key >> 3, number, value[first:at]
-            continue
-        if key & 7 == 2:
+        size: Any = {1: 8, 5: 4}.get(key & 7)
+        if key & 7 in (0, 2):
             size, at = _varint(value, at)
-        if size is None or at + size > len(value):
-            raise ValueError(
-                "a field of an unknown kind, or one that runs past its message"
-            )
-        at += size
-        yield key >> 3, value[at - size : at], value[first:at]
-
-
-def message_of(value: memoryview) -> Message:
-    """The values of a protobuf message's fields."""
-    fields: Message = defaultdict(list)
-    for number, content, _ in fields_of(value):
-        fields[number].append(content)
+        content = size
+        if key & 7:
+            if at + size > len(value):  # a TypeError where the field's kind is unknown
+                raise ValueError("a field that runs past its message")
+            content = value[at : at + size]
+            at += size
+        fields[key >> 3].append(content)
     return fields
 
 
@@ -138,8 +131,15 @@ def read(data: bytes, name: str) -> Contents:
     """The contents of a model file.
 
     Raises:
-        InputError: it is not an ONNX model; the sentence names the file.
+        InputError: it is not an ONNX model, or was changed since it was exported; the
+            sentence names the file.
     """
+    digits = data[-DIGITS:]
+    digest = hashlib.sha256(memoryview(data)[:-DIGITS]).hexdigest()
+    if digits.isalnum() and digits != digest.encode():
+        raise InputError(
+            f"{name}: was changed or damaged since its export; copy or export it again"
+        )
     contents = Contents(data)
     try:
         model = message_of(memoryview(data))
@@ -178,8 +178,7 @@ def _read_node(fields: Message, contents: Contents) -> None:
     domain = text_of(fields, DOMAIN)
     operator = text_of(fields, OPERATOR)
     if domain not in ("", "ai.onnx") or operator not in OPERATORS:
-        foreign = f"operator {domain}.{operator}".replace(" .", " ")
-        contents.foreign.append(foreign)
+        contents.foreign.append(f"operator {domain}.{operator}".replace(" .", " "))
     attributes = {}
     for attribute in messages(fields, ATTRIBUTES):
         if not attribute.keys() <= NUMBERS:
@@ -187,8 +186,7 @@ def _read_node(fields: Message, contents: Contents) -> None:
         if WHOLE in attribute:
             value = attribute[WHOLE][-1]
             # Negative numbers are stored modulo 2^64.
-            negative = value >= 1 << 63
-            attributes[text_of(attribute, 1)] = value - (1 << 64) * negative
+            attributes[text_of(attribute, 1)] = value - (value >> 63 << 64)
     inputs = _texts(fields, 1)
     contents.nodes.append(Node(operator, inputs, _texts(fields, 2), attributes))
 

@@ -2,7 +2,11 @@
 
 import math
 
-from edge.model.info import TEST_SHARE, Stopping
+from edge.model.info import Stopping
+
+TEST_SHARE = 0.5
+"""Part of the risk that the tests on calibration trials take. The rest covers the
+exported model, which errs more or less often than the folds' models do on average."""
 
 
 def refusal(stopping: Stopping, error: float) -> str:
@@ -11,7 +15,7 @@ def refusal(stopping: Stopping, error: float) -> str:
     share = stopping.wrong / stopping.trials
     sentence = (
         f"the smallest error that {stopping.trials} calibration trials certify is "
-        f"{stopping.smallest_error:.3f}"
+        f"{stopping.rules[0].error:.3f}"
     )
     if share >= error:
         return (

@@ -12,7 +12,7 @@ by.
 | `vectors` | float64 (v, width) | feature vectors; the first m are the trials', in order |
 | `<task>_label`, `_scores`, `_distances`, `_neighbours` | | the graph's outputs for `vectors` |
 | `<task>_label_distances` | float64 (v, labels) | likewise, where the model gives them |
-| `novelty` | float64 (v,) | likewise |
+| `novelty`, `remoteness` | float64 (v,) | likewise |
 | `out_of_range` | float64 (v,) | the graph's output |
 | `decision_point_vectors` | float64 (points, w, width) | vectors for each decision point |
 | `<task>_decision_point_label`, ... | | the graph's outputs for these, each at its point |
@@ -26,6 +26,7 @@ import os
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from itertools import chain, pairwise, starmap
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -41,7 +42,7 @@ from edge.touch.layout import SkinLayout
 
 OUTPUTS = ("label", "neighbours", "scores", "distances")
 """Ends of the names of a task's outputs."""
-OF_ALL_TASKS = ("novelty", "out_of_range")
+OF_ALL_TASKS = ("novelty", "remoteness", "out_of_range")
 """Outputs that belong to no task."""
 
 Line = tuple[str, Array, Array]
@@ -70,6 +71,11 @@ class Check:
     def passed(self) -> bool:
         """Whether all rows are equal."""
         return self.row is None
+
+
+def golden_of(model: str | Path, version: str) -> Path:
+    """The golden file of an installed model, beside it."""
+    return Path(model).with_name(f"golden-{version}.npz")
 
 
 def first_series(

@@ -1,6 +1,7 @@
 """From the bytes of all chips to raw taxel values, and which of them can be trusted; from
 these to counts above a baseline that follows slow drift, in integers: results repeat."""
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import groupby
@@ -18,6 +19,8 @@ NEVER_STUCK = int(np.iinfo(np.int64).max)
 LOG_CHANCE = -27.6
 """Logarithm of the chance, 1e-12, that a working chip repeats its bytes for so long that
 it counts as stuck."""
+CONVERSION_FRAMES = 4
+"""Frames that may hold the values of one conversion."""
 COARSE = 0.4
 """Variance in squared counts below which a reading takes two or three whole numbers."""
 SCALE_BITS = 12
@@ -91,7 +94,8 @@ def repeat_chance(noise: Floats) -> Floats:
 
 
 def stuck_limits(file: SkinFile) -> Integers:
-    """(chips,) equal readings in a row after which a chip is stuck.
+    """(chips,) equal readings in a row after which a chip is stuck: as few as its noise
+    proves, and at most `stuck_frames`.
 
     Only of a chip whose calibrated noise shows in whole counts, and of one whose bytes
     hold a sequence number, must the bytes change.
@@ -99,11 +103,13 @@ def stuck_limits(file: SkinFile) -> Integers:
     stuck = file.reading.stuck_frames
     limits = []
     for chip in file.chips:
-        log_chance = 0.0
+        limit = NEVER_STUCK
         if file.calibration is not None:
             noise = file.calibration.noise.ravel()[chip.served]
-            log_chance = stuck * float(np.log(repeat_chance(noise)).sum())
-        limit = stuck if log_chance <= LOG_CHANCE else NEVER_STUCK
+            log_chance = float(np.log(repeat_chance(noise)).sum())
+            if stuck * log_chance <= LOG_CHANCE:
+                conversions = math.ceil(LOG_CHANCE / log_chance)
+                limit = min(CONVERSION_FRAMES * conversions, stuck)
         if chip.kind.unchanged_frames is not None:
             limit = min(chip.kind.unchanged_frames, stuck)
         limits.append(limit)

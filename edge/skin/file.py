@@ -51,8 +51,8 @@ class Reading:
         verify_mux: read a mux's control byte back after each selection.
         recheck_frames: number of frames between two checks of a chip's settings on each
             bus.
-        stuck_frames: a chip whose bytes do not change for this many frames is invalid,
-            if it made noise during calibration.
+        stuck_frames: a chip whose bytes do not change for this many frames, or for as
+            few as its noise proves, is invalid, if it made noise during calibration.
     """
 
     rate_hz: float = 100.0

@@ -14,6 +14,7 @@ from edge.commands.output import Output
 from edge.fake.touches import still, touches
 from edge.saving import save
 from edge.skin.file import load
+from edge.writing import remove_leftovers
 
 TRIALS = 12
 """Enough of each touch for a trade-off."""
@@ -51,6 +52,7 @@ def run(arguments: argparse.Namespace) -> int:
     output = Output.of(arguments)
     folder = arguments.out / "touches"
     rest = arguments.out / "still.npz"
+    remove_leftovers(folder)
     save(rest, still(file, STILL_S))
     paths = []
     for name, recording in touches(file, trials=arguments.trials, seed=arguments.seed):

@@ -7,13 +7,20 @@ compares two on recordings.
 
 import argparse
 import json
+from collections.abc import Iterator, Mapping
 from typing import Any
 
 from edge.commands.output import Output, counted
 from edge.commands.texts import wrapped
-from edge.model.info import ModelInfo
+from edge.model.info import ModelInfo, Stopping
 from edge.model.metadata import to_json
 from edge.model.model import Model
+from edge.model.onnx_file import DIGITS
+
+UNMEASURED = (
+    "What it makes of each {} that it has not met is not known: too few were trained for "
+    "any to be left out."
+)
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
@@ -36,6 +43,7 @@ def described(model: Model) -> dict[str, Any]:
         "file": model.path,
         "version": model.version,
         "bytes": len(model.contents.data),
+        "digest": model.contents.data[-DIGITS:].isalnum(),
         **json.loads(to_json(model.info)),
     }
 
@@ -44,6 +52,7 @@ def description(info: ModelInfo, about: dict[str, Any]) -> str:
     """The description for a person."""
     named = f"{info.name} " if info.name else ""
     size = f"{about['bytes'] / 1024:.0f} kB, format {about['format']}"
+    size += "" if about["digest"] else ", no digest"
     lines = [f"{about['file']}: {named}{about['version']}, {size}", ""]
     for name, task in info.tasks.items():
         lines += wrapped(
@@ -61,9 +70,27 @@ def description(info: ModelInfo, about: dict[str, Any]) -> str:
     if info.decision_points_s:
         points = ", ".join(f"{point:g}" for point in info.decision_points_s)
         lines.append(f"With --error, it may decide at {points} s.")
+    for sentence in doubt(info.stopping):
+        lines += wrapped(sentence)
     for sentence in _origin(info):
         lines += wrapped(sentence)
     return "\n".join(lines)
+
+
+def doubt(stopping: Mapping[str, Stopping]) -> Iterator[str]:
+    """A sentence on what a calibrated model's doubt about names is worth."""
+    for task, of_task in stopping.items():
+        if of_task.remoteness is not None:
+            worth = of_task.remoteness.worth
+            yield _worth(task, **worth) if worth else UNMEASURED.format(task)
+
+
+def _worth(task: str, unknown: float, unsure: float, sure: float, known: float) -> str:
+    return (
+        f"Of touches of each {task} that it has not met, {unknown:.0%} are called "
+        f"unknown, {unsure:.0%} are named with a confidence below 50 %, {sure:.0%} with "
+        f"more than 90 %; of those that it knows {known:.0%} are called unknown."
+    )
 
 
 def _origin(info: ModelInfo) -> list[str]:

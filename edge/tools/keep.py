@@ -1,6 +1,7 @@
 """Touches that `run` keeps as recordings, with their decisions, to learn from."""
 
 import queue
+import re
 import threading
 from collections import deque
 from collections.abc import Sequence
@@ -12,29 +13,34 @@ from edge.commands.output import LOG, counted
 from edge.commands.source import Opened
 from edge.errors import EdgeError, InputError
 from edge.events import Decided, Event
-from edge.model.info import UNKNOWN, ModelInfo
-from edge.saving import save
+from edge.model.info import ModelInfo
+from edge.recording import load_arrays, load_meta
+from edge.saving import alone, save
 from edge.tools.record import Trials, recording, shared_meta
 from edge.tools.review import UNSURE, decisions_of
 from edge.touch.frame import Frame
 from edge.writing import check_writable
 
-REASONS = ("unsure", "unknown", "all")
+REASONS = ("unsure", "unknown", "unusual", "all")
 LONGEST_S = 10.0
 """Seconds from onset that are kept of a touch."""
 WAITING = 4
 """Touches that may wait to be written; of more the oldest is lost."""
-STEM = "kept"
+STEM = "kept-n"
+"""Begins a kept file's name, before its number. The numbers, and not a clock that may go
+back, tell which came first; older versions' names, `kept-` with a time, come before."""
+NUMBER = re.compile(rf"{STEM}(\d+)-")
 
 
 class Keeper:
     """Collects touches with their decisions, and saves those that ask for it.
 
     Files are written by a thread, whole or not at all, so that no disk delays a
-    decision. The oldest go first where they would exceed the limit.
+    decision. Where they would exceed the limit, those without labels go, the oldest
+    first, so that in the end a new one may not stay.
 
     Attributes:
-        kept: number of files written.
+        written: the files of this run.
         lost: touches that came faster than they could be written.
     """
 
@@ -59,7 +65,7 @@ class Keeper:
             InputError: the folder cannot be written.
         """
         check_writable(folder)
-        self.kept = 0
+        self.written: list[Path] = []
         self.lost = 0
         self._folder = folder
         self._reasons = frozenset(reasons)
@@ -94,9 +100,10 @@ class Keeper:
             self._hand_over(frames)
         self._queue.put(None)
         self._thread.join()
-        if self.kept or self.lost:
+        if self.written or self.lost:
+            kept = sum(path.exists() for path in self.written)
             lost = f", {self.lost} lost" if self.lost else ""
-            LOG.info(f"{self._folder}: {counted(self.kept, 'recording')} kept{lost}")
+            LOG.info(f"{self._folder}: {counted(kept, 'recording')} kept{lost}")
 
     def _hand_over(self, frames: list[Frame]) -> None:
         first = frames[0].t
@@ -120,8 +127,12 @@ class Keeper:
 
     def _write(self, frames: list[Frame], decided: list[Decided]) -> None:
         now = datetime.now(UTC)
+        numbers = [0]
+        for file in self._folder.glob(f"{STEM}*.npz"):
+            numbers += map(int, NUMBER.findall(file.name))
         # Another run may keep touches in this folder in the same second.
-        name = f"{STEM}-{now:%Y%m%dT%H%M%S}-{now.microsecond:06}"
+        time = f"{now:%Y%m%dT%H%M%S}-{now.microsecond:06}"
+        name = f"{STEM}{max(numbers) + 1:06}-{time}"
         meta = {
             **self._meta,
             "trial": name,
@@ -131,23 +142,37 @@ class Keeper:
         }
         path = self._folder / f"{name}.npz"
         save(path, recording(frames, meta), lasting=False, overwrite=False)
-        self.kept += 1
-        self._make_room()
+        self.written.append(path)
+        with suppress(InputError), alone([self._folder]):
+            self._make_room()
+        if not path.exists():
+            LOG.warning(
+                f"{self._folder}: touches are no longer kept, as labelled ones fill the "
+                "limit of --keep-mb; move them to another folder, or raise it"
+            )
 
     def _make_room(self) -> None:
-        """Remove the oldest kept files until the rest fits, but for those that cannot
-        be removed."""
+        """Remove the oldest kept files without labels until the rest fits, but for those
+        that cannot be removed."""
         sizes = {}
-        for file in sorted(self._folder.glob(f"{STEM}-*.npz")):
+        for file in sorted(self._folder.glob("kept-*.npz")):
             with suppress(OSError):  # another program may be quicker
                 sizes[file] = file.stat().st_size
-        total = sum(sizes.values())
-        for file in list(sizes)[:-1]:
-            if total <= self._most_bytes:
-                return
-            with suppress(OSError):
-                file.unlink(missing_ok=True)
-                total -= sizes[file]
+        excess = sum(sizes.values()) - self._most_bytes
+        for file, size in sizes.items():
+            if excess > 0 and not is_labelled(file):
+                with suppress(OSError):
+                    file.unlink()
+                    excess -= size
+
+
+def is_labelled(file: Path) -> bool:
+    """Whether a recording has a label; a damaged one has none."""
+    with suppress(InputError):
+        return bool(
+            load_meta(str(file), load_arrays(file, keys=("meta",))).get("labels")
+        )
+    return False
 
 
 def reasons_of(decided: Sequence[Decided]) -> set[str]:
@@ -155,9 +180,8 @@ def reasons_of(decided: Sequence[Decided]) -> set[str]:
     reasons = {"all"}
     for decision in decided:
         sure = decision.confidence
-        if UNKNOWN in decision.flags:
-            reasons.add("unknown")
-        if sure is None or sure < UNSURE or "unsure" in decision.flags:
+        reasons.update(set(REASONS) & set(decision.flags))
+        if sure is None or sure < UNSURE:
             reasons.add("unsure")
     return reasons
 

@@ -8,34 +8,22 @@ last change back. The next `make export` trains on the new labels.
 """
 
 import argparse
-import json
-import shutil
 import sys
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from edge.commands.output import LOG, Output, counted
+from edge.commands.output import Output, counted
 from edge.commands.texts import labels_text
-from edge.config import parse_json
 from edge.errors import InputError
-from edge.files import parsing, read_text, refusing
 from edge.recording import Recording, load
-from edge.saving import find, save
+from edge.saving import alone, change_all, find, take_back
 from edge.tools import review
 from edge.tools.slips import counts_text, slips
 from edge.tools.trial_options import task_label
-from edge.writing import remove_leftovers, write_whole
 
-JOURNAL = ".edge-classify-labels.json"
-"""Beside recordings whose labels are being changed."""
-UNDO = ".edge-classify-undo.json"
-"""Beside the first of the recordings that were changed last: their former labels."""
 LINE = 16
 """Characters of a recording's course."""
-DELETED = ".edge-classify-deleted"
-"""The folder of recordings that were deleted last."""
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
@@ -90,96 +78,68 @@ def run(arguments: argparse.Namespace) -> int:
     if arguments.undo:
         return undo(arguments.data, output)
     every = find(arguments.data)
-    recordings = _chosen(every, arguments.only)
-    if not recordings:
-        output.text(f"none of {counted(len(every), 'recording')} is of this kind")
-        return 1
-    if arguments.delete:
-        return _delete(arguments, output, [path for path, _ in recordings])
-    if arguments.accept or arguments.set or arguments.unset:
-        return _relabel(arguments, output, recordings)
-    _print(output, recordings)
-    return 0
+    words = arguments
+    if not (words.accept or words.set or words.unset or words.delete):
+        recordings = _chosen(output, every, words.only)
+        if recordings:
+            _print(output, recordings)
+        return int(not recordings)
+    # Nobody else changes what is changed here, from its reading on.
+    with alone(path.parent for path in every):
+        recordings = _chosen(output, every, arguments.only)
+        return _change(arguments, output, recordings) if recordings else 1
 
 
 def _chosen(
-    paths: Sequence[Path], kinds: Sequence[str]
+    output: Output, paths: Sequence[Path], kinds: Sequence[str]
 ) -> list[tuple[Path, Recording]]:
-    """The recordings that are of all kinds, after interrupted changes are finished."""
-    for folder in sorted({path.parent for path in paths}):
-        finish_interrupted(folder)
+    """The recordings that are of all kinds, with a message if there are none."""
     chosen = []
     for path in paths:
         recording = load(path)
         if review.selected(recording.meta, kinds):
             chosen.append((path, recording))
+    if not chosen:
+        output.text(f"none of {counted(len(paths), 'recording')} is of this kind")
     return chosen
 
 
-def _relabel(
+def _change(
     arguments: argparse.Namespace,
     output: Output,
     recordings: Sequence[tuple[Path, Recording]],
 ) -> int:
-    """Show what labels become, ask, and change them."""
-    changes = {}
+    """Show what becomes of recordings, ask, and change them."""
+    changes: dict[Path, dict[str, str] | None] = {}
     for path, recording in recordings:
-        labels = review.accepted(recording.meta) if arguments.accept else {}
-        labels |= arguments.set
-        after = changed(
-            str(path),
-            recording.meta,
-            labels,
-            arguments.unset,
-        )
+        after = _after(arguments, path, recording)
         if recording.labels != after:
             changes[path] = after
+            becomes = "is deleted" if after is None else f"becomes {_text(after)}"
+            output.text(f"{path}: {_text(recording.labels)} {becomes}")
     if not changes:
         output.text(f"none of {counted(len(recordings), 'recording')} would change")
         return 0
-    for path, recording in recordings:
-        if path in changes:
-            old = _text(recording.labels)
-            output.text(f"{path}: {old} becomes {_text(changes[path])}")
     if not _agreed(arguments, output, len(changes)):
         return 1
     change_all(changes)
-    _print(output, [(path, load(path)) for path, _ in recordings])
+    if arguments.delete:
+        deleted = counted(len(changes), "recording")
+        output.text(f"{deleted} deleted; --undo brings them back")
+    else:
+        _print(output, [(path, load(path)) for path, _ in recordings])
     return 0
 
 
-def _delete(
-    arguments: argparse.Namespace,
-    output: Output,
-    paths: Sequence[Path],
-) -> int:
-    """Show what is deleted, ask, and delete it."""
-    for path in paths:
-        output.text(f"{path}: to be deleted")
-    if not _agreed(arguments, output, len(paths)):
-        return 1
-    delete(paths)
-    output.text(f"{counted(len(paths), 'recording')} deleted; --undo brings them back")
-    return 0
-
-
-def delete(paths: Sequence[Path]) -> None:
-    """Delete recordings, so that `take_back` can bring them back.
-
-    Raises:
-        InputError: the system refuses it.
-    """
-    for folder in sorted({path.parent for path in paths}):
-        with refusing(f"{folder}: its recordings cannot be deleted"):
-            of_folder = [path for path in paths if path.parent == folder]
-            # What cannot be deleted takes no former change away.
-            for path in of_folder:
-                path.lstat()
-            shutil.rmtree(folder / DELETED, ignore_errors=True)
-            (folder / DELETED).mkdir()
-            (folder / UNDO).unlink(missing_ok=True)
-            for path in of_folder:
-                path.rename(folder / DELETED / path.name)
+def _after(
+    arguments: argparse.Namespace, path: Path, recording: Recording
+) -> dict[str, str] | None:
+    """The labels that a recording gets; None if it is deleted."""
+    if arguments.delete:
+        return None
+    labels = review.accepted(recording.meta) if arguments.accept else {}
+    labels |= arguments.set
+    return changed(str(path), recording.meta, labels, arguments.unset)
 
 
 def undo(data: Sequence[str], output: Output) -> int:
@@ -189,94 +149,17 @@ def undo(data: Sequence[str], output: Output) -> int:
         InputError: there is nothing to take back, or no such folder.
     """
     folders = sorted({Path(name) for name in data})
-    brought = []
     for folder in folders:
         if not folder.is_dir():
             raise InputError(f"{folder}: --undo takes the folder of the recordings")
-        brought += take_back(folder)
+    with alone(folders):
+        brought = take_back(folders)
     if not brought:
         where = ", ".join(map(str, folders))
         raise InputError(f"{where}: there is no change to take back")
     for path in brought:
         output.text(f"{path}: is as it was before")
     return 0
-
-
-def take_back(folder: Path) -> list[Path]:
-    """Take the last change or deletion of recordings in a folder back; which they are.
-
-    Raises:
-        InputError: by now, another recording has the name of a deleted one.
-    """
-    deleted = sorted((folder / DELETED).glob("*.npz"))
-    places = [folder / path.name for path in deleted]
-    for place in places:
-        if place.exists():
-            raise InputError(f"{place}: exists again; rename it, and undo then")
-    for path, place in zip(deleted, places, strict=True):
-        path.rename(place)
-    return [*places, *_carry_out(folder / UNDO)]
-
-
-def _carry_out(journal: Path) -> list[Path]:
-    """Give recordings the labels that a journal names, if there is one, and remove it.
-
-    Returns:
-        The recordings whose labels changed.
-
-    Raises:
-        InputError: the journal is damaged, or a recording cannot be written.
-    """
-    if not journal.is_file():
-        return []
-    entries = parse_json(read_text(journal), str(journal))
-    with parsing(str(journal), "a list of files and labels", "; delete it"):
-        changes = [(Path(name), dict(labels)) for name, labels in entries]
-    relabelled = []
-    for path, labels in changes:
-        if path.is_file():
-            recording = load(path)
-            if recording.labels != labels:
-                meta = {**recording.meta, "labels": labels}
-                save(path, replace(recording, meta=meta))
-                relabelled.append(path)
-    journal.unlink()
-    return relabelled
-
-
-def change_all(changes: Mapping[Path, Mapping[str, str]]) -> None:
-    """Give each recording its new labels: all of them, or a later start does.
-
-    A journal beside the first file says what is to be done, until it is. Each folder
-    keeps the former labels of its recordings.
-    """
-    former: dict[Path, dict[Path, Mapping[str, str]]] = {}
-    for path in changes:
-        former.setdefault(path.parent, {})[path] = load(path).labels
-    for folder, labels in former.items():
-        _note(folder / UNDO, labels)
-        shutil.rmtree(folder / DELETED, ignore_errors=True)
-    journal = next(iter(changes)).parent / JOURNAL
-    _note(journal, changes)
-    _carry_out(journal)
-
-
-def _note(journal: Path, labels: Mapping[Path, Mapping[str, str]]) -> None:
-    """Write a journal of the labels of recordings."""
-    entries = [[str(path.absolute()), labels[path]] for path in labels]
-    with write_whole(journal) as file:
-        file.write(json.dumps(entries).encode())
-
-
-def finish_interrupted(folder: Path) -> None:
-    """Finish a change of labels that was interrupted, where a journal tells of one."""
-    remove_leftovers(folder)
-    if (folder / JOURNAL).is_file():
-        finished = len(_carry_out(folder / JOURNAL))
-        LOG.warning(
-            f"{folder}: finished a change of labels that was interrupted: "
-            f"{counted(finished, 'recording')}"
-        )
 
 
 def _agreed(arguments: argparse.Namespace, output: Output, count: int) -> bool:

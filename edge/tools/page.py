@@ -16,8 +16,10 @@ import numpy as np
 from edge.errors import InputError
 from edge.events import Decided, Event, Onset
 from edge.recording import Recording, load
+from edge.saving import alone, change_all, finish_interrupted, take_back
 from edge.skin.loop import Schedule
-from edge.tools import label, review
+from edge.tools import review
+from edge.tools.label import changed
 from edge.tools.web import WebServer
 from edge.touch.contact import Contact
 from edge.touch.frame import Frame
@@ -190,6 +192,7 @@ class Page:
         gone."""
         if self._folder is None:
             return
+        finish_interrupted([self._folder])
         paths = sorted(self._folder.glob("[!.]*.npz"))[-LAST_TRIALS:]
         present = {path.name for path in paths}
         for name in set(self._trials) - present:
@@ -252,28 +255,38 @@ class Page:
         if name not in list(self._trials):
             raise InputError(f"{name!r} is none of the trials that this page shows")
         path = folder / str(name)
-        if action["do"] == "delete":
-            label.delete([path])
-            del self._trials[path.name]
-            self._version += 1
-        else:
-            meta = load(path).meta
-            accepts = action["do"] == "accept"
-            labels = review.accepted(meta) if accepts else _labels(action)
-            if not labels:
-                raise InputError(
-                    f"{name}: no decision names a label that it does not have yet"
-                )
-            label.change_all({path: label.changed(str(path), meta, labels)})
-            self._show_trial(path)
+        with alone([folder]):
+            if action["do"] == "delete":
+                change_all({path: None})
+                del self._trials[path.name]
+                self._version += 1
+            else:
+                self._relabel(path, action)
+                self._show_trial(path)
         self._undo = path.name
+
+    def _relabel(self, path: Path, action: Json) -> None:
+        """Give a trial the labels of an action, or accept its decisions.
+
+        Raises:
+            InputError: it has no decision to accept, or cannot be read or written.
+        """
+        meta = load(path).meta
+        accepts = action["do"] == "accept"
+        labels = review.accepted(meta) if accepts else _labels(action)
+        if not labels:
+            raise InputError(
+                f"{path.name}: no decision names a label that it does not have yet"
+            )
+        change_all({path: changed(str(path), meta, labels)})
 
     def _take_back(self, folder: Path) -> None:
         """Bring back what the last action changed or deleted."""
         if self._undo is None:
             raise InputError("there is nothing to undo")
-        for path in label.take_back(folder):
-            self._show_trial(path)
+        with alone([folder]):
+            for path in take_back([folder]):
+                self._show_trial(path)
         self._undo = None
 
 

@@ -23,7 +23,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from edge.arrays import Array, Floats
-from edge.classifier import Classifier
+from edge.classifier import AsideEvents, Classifier
 from edge.commands.options import add_reading, within
 from edge.commands.output import LOG
 from edge.commands.source import Opened, reading
@@ -33,11 +33,10 @@ from edge.files import refusing
 from edge.model.model import Model
 from edge.output.event_writer import Lines
 from edge.recording import Recording
-from edge.saving import save
+from edge.saving import DELETED, save
 from edge.skin import file as skinfile
 from edge.skin.file import SkinFile
 from edge.skin.skin import Skin
-from edge.tools.label import DELETED
 from edge.tools.review import decisions_of
 from edge.tools.trial_options import add_arm, open_arm, task_label
 from edge.touch.arm import Chain
@@ -103,10 +102,17 @@ class Trials:
 
     A trial lasts from the lead-in before onset to the end of the contact, or to
     `length_s` after onset. No other trial begins while a saved contact continues.
+    Its frames are without what is set aside.
+
+    Attributes:
+        aside: names what is set aside.
     """
 
     def __init__(self, skin: Skin, length_s: float) -> None:
-        self._tracker = WatchfulTracker(ContactTracker(skin.layout, horizon_s=0.0))
+        # The last second of a trial may be as still as it likes.
+        tracker = ContactTracker(skin.layout, horizon_s=length_s - 1.0)
+        self._tracker = WatchfulTracker(tracker)
+        self.aside = AsideEvents(self._tracker)
         self._length = length_s
         self._before: deque[Frame] = deque(
             maxlen=round(LEAD_S / skin.period_s) + DEBOUNCE
@@ -118,6 +124,7 @@ class Trials:
     def push(self, frame: Frame) -> list[Frame] | None:
         """Take in a frame; returns the frames of a trial that this frame completes."""
         contact = next(iter(self._tracker.push(frame)), None)
+        frame = self._tracker.seen or frame
         if self._frames is not None:
             self._frames.append(frame)
         else:
@@ -235,7 +242,10 @@ def run(arguments: argparse.Namespace) -> int:
         trials = Trials(live.skin, arguments.length)
         classifier = None if model is None else Classifier(model, live.skin.layout)
         for frame, faults in live.frames():
-            events = [] if classifier is None else classifier.push(frame)
+            if classifier is None:
+                events = trials.aside.at(frame.t)
+            else:
+                events = classifier.push(frame)
             lines.write([*faults, *(event.to_dict() for event in events)])
             live.show(frame, faults, events)
             recorder.follow(trials, events)

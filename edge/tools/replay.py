@@ -7,7 +7,6 @@ named on stderr and skipped; the exit status is then 2.
 from __future__ import annotations
 
 import argparse
-import math
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
@@ -22,7 +21,7 @@ from edge.model.model import Model
 from edge.model.verify import first_series
 from edge.recording import Recording, load
 from edge.saving import find
-from edge.statistics import wilson
+from edge.statistics import paired, wilson
 from edge.touch.contact import FeatureSeries
 
 UNDECIDED = "(none)"
@@ -156,15 +155,18 @@ def compared(name: str, first: Summary, second_name: str, second: Summary) -> st
         gained = changes[1]
         lost = changes[-1]
         n = len(shared)
-        change = (gained - lost) / n
-        spread = math.sqrt(max(gained + lost - n * change**2, 0.0)) / n
-        low = 100.0 * (change - 1.96 * spread)
-        high = 100.0 * (change + 1.96 * spread)
+        low, high = paired(gained, lost, n)
         lines.append(
             f"{printable(task)}: {gained} gained, {lost} lost of {n}: "
-            f"{100.0 * change:+.1f} points (95 % interval {low:+.1f} to {high:+.1f})"
+            f"{100.0 * (gained - lost) / n:+.1f} points (95 % interval "
+            f"{100.0 * low:+.1f} to {100.0 * high:+.1f})"
         )
-    return "\n".join([lines[0], *sorted(lines[1:])])
+    favoured = [
+        f"{path} was fitted on {summary.as_trained} of these recordings, which favours it"
+        for path, summary in ((name, first), (second_name, second))
+        if summary.as_trained
+    ]
+    return "\n".join([lines[0], *sorted(lines[1:]), *favoured])
 
 
 class Summary:

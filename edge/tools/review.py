@@ -8,9 +8,10 @@ from typing import Any
 import numpy as np
 
 from edge.events import Decided
-from edge.model.info import UNKNOWN
 from edge.recording import Recording
 
+UNKNOWN = "unknown"
+"""The flag of a thing that was never met; in former recordings its label too."""
 UNSURE = 0.8
 """Confidence below which a decision is unsure."""
 KINDS = ("unsure", "wrong", "unlabelled")

@@ -17,6 +17,7 @@ slip."""
 LETTERS_PER_SLIP = 7
 """Letters of a name for each wrong one, of which one is always allowed."""
 SPACES = re.compile(r"[\s_-]+")
+MOST_NAMES = 500
 MOST = 8
 """Sentences of a kind."""
 
@@ -84,6 +85,8 @@ def _rare_labels(task: str, labels: Labels) -> list[str]:
 def _meant(name: str, count: int, counts: Mapping[str, int]) -> str | None:
     """The more frequent name that one is probably a slip of."""
     plain = _plain(name)
+    if len(counts) > MOST_NAMES:  # too many to be compared with each other
+        return None
     for candidate, frequent in counts.items():
         share = FEW_SHARE if len(plain) > SHORT else RARE_SHARE
         is_rare = count <= share * frequent

@@ -137,6 +137,8 @@ class WebServer:
         self._pages = resources.files("edge.tools") / "pages"
         self._browsers: list[str] = []
         """The address of each connection."""
+        self._strangers: dict[StreamWriter, str] = {}
+        """The address of each connection that has not sent the token yet."""
         self._closing = False
         sys.setswitchinterval(min(sys.getswitchinterval(), SWITCH_S))
         self._thread = threading.Thread(target=self._run, daemon=True)
@@ -178,15 +180,22 @@ class WebServer:
     async def _serve(self, reader: StreamReader, writer: StreamWriter) -> None:
         """Serve a browser until it is slow or gone, or the server is closed.
 
-        It is refused if it, or all browsers together, have too many connections.
+        Where it, or all browsers together, have too many connections, the oldest one
+        that has not sent the token makes room; if all have, this one is refused.
         """
         peer = writer.get_extra_info("peername") or [""]  # it may have gone already
         address = str(peer[0])
-        full = len(self._browsers) >= MOST_CONNECTIONS
-        if full or self._browsers.count(address) >= MOST_OF_ONE:
-            writer.transport.abort()
-            return
+        of_one = self._browsers.count(address) >= MOST_OF_ONE
+        if of_one or len(self._browsers) >= MOST_CONNECTIONS:
+            places = self._strangers.items()
+            strangers = [w for w, place in places if not of_one or place == address]
+            oldest = next(iter(strangers), writer)
+            self._strangers.pop(oldest, None)
+            oldest.transport.abort()
+            if oldest is writer:
+                return
         self._browsers.append(address)
+        self._strangers[writer] = address
         # `drain` then waits until all is sent.
         writer.transport.set_write_buffer_limits(0)
         try:
@@ -198,6 +207,7 @@ class WebServer:
                     await self._stream(reader, writer)
         finally:
             self._browsers.remove(address)
+            self._strangers.pop(writer, None)
             writer.transport.abort()
 
     async def _answer(self, reader: StreamReader, writer: StreamWriter) -> bytes:
@@ -209,6 +219,7 @@ class WebServer:
         method, path, query = _request_line(request)
         if path not in OPEN and not self._has_token(query):
             return _answer(HTTPStatus.UNAUTHORIZED, WRONG_TOKEN)
+        self._strangers.pop(writer, None)
         try:
             fields = _fields(await reader.readuntil(b"\n\r\n"))
         except asyncio.LimitOverrunError:

@@ -8,7 +8,7 @@ from typing import Self
 
 import numpy as np
 
-from edge.arrays import Array, Booleans
+from edge.arrays import Array, Booleans, Indices
 from edge.touch.grid import Grid, grid
 
 
@@ -18,14 +18,21 @@ class Region:
     Attributes:
         area: number of taxels.
         peak: largest count.
-        bits: the taxels as the bits of an integer (see `Grid`).
     """
 
-    def __init__(self, on: Grid, bits: int, peak: int) -> None:
+    def __init__(self, on: Grid, taxels: int | Indices, peak: int) -> None:
+        """Take the taxels as bits, or as indices (row * stride + col), of a grid."""
         self._grid = on
-        self.bits = bits
-        self.area = bits.bit_count()
+        self._taxels = taxels
+        self.area = taxels.bit_count() if isinstance(taxels, int) else len(taxels)
         self.peak = peak
+
+    @cached_property
+    def bits(self) -> int:
+        """The taxels as the bits of an integer (see `Grid`)."""
+        if isinstance(self._taxels, int):
+            return self._taxels
+        return self._grid.bits_at(self._taxels)
 
     @cached_property
     def sums(self) -> tuple[int, int]:
@@ -46,7 +53,12 @@ class Region:
     def touches(self, region: Self) -> bool:
         """Whether a taxel of this region is next to, or the same as, one of another
         region."""
-        return bool((self.bits | self._grid.neighbours(self.bits)) & region.bits)
+        return bool(self._grown & region.bits)
+
+    @cached_property
+    def _grown(self) -> int:
+        """The taxels and their neighbours."""
+        return self.bits | self._grid.neighbours(self.bits)
 
 
 class ActiveTaxels:
@@ -83,7 +95,7 @@ class ActiveTaxels:
         from edge.touch.components import all_of
 
         components = all_of(self._padded, self.counts, self._grid.wraps)
-        regions = [Region(self._grid, bits, peak) for bits, peak in components]
+        regions = [Region(self._grid, taxels, peak) for taxels, peak in components]
         # Of regions alike in both, the order stays that of their first taxels.
         return sorted(regions, key=lambda region: (-region.area, -region.peak))
 
@@ -97,11 +109,11 @@ class ActiveTaxels:
         bits = self._grid.flood(self._grid.bit(index) & self.bits, self.bits)
         if bits is not None and 2 * bits.bit_count() > self.bits.bit_count():
             return Region(self._grid, bits, self.counts.item(index))
-        from edge.touch.components import largest_bits  # one flood does for a touch
+        from edge.touch.components import largest_of  # one flood does for a touch
 
         before = 0 if previous is None else previous.bits
-        bits, peak = largest_bits(self._grid, self._padded, self.counts, before)
-        return Region(self._grid, bits, peak)
+        taxels, peak = largest_of(self._grid, self._padded, self.counts, before)
+        return Region(self._grid, taxels, peak)
 
     def has_other(self, region: Region, onset: int) -> bool:
         """Whether a taxel beside a region is above the onset."""

@@ -7,16 +7,14 @@ to, until none is next to another (Shiloach and Vishkin, An O(log n) parallel
 connectivity algorithm, 1982). The rounds are few, and each is linear in the runs.
 """
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
-from edge.arrays import Array, Booleans, Integers
+from edge.arrays import Array, Booleans, Indices, Integers
 from edge.touch.grid import Grid
-
-Indices = NDArray[np.intp]
 
 
 @dataclass(frozen=True)
@@ -115,58 +113,30 @@ def all_of(
     active: Booleans,
     counts: Array,
     wraps: bool,
-) -> list[tuple[int, int]]:
-    """Taxels, as the bits of `edge.touch.grid.Grid`, and peak of each component.
-
-    The arguments are those of `largest_of`.
-    """
-    components = components_of(active, wraps)
-    bits = [0] * len(components.areas)
-    runs = zip(
-        components.labels.tolist(),
-        components.starts.tolist(),
-        components.lengths.tolist(),
-        strict=True,
-    )
-    for label, start, length in runs:
-        bits[label] |= ((1 << length) - 1) << start
-    return list(zip(bits, _peaks(components, active, counts).tolist(), strict=True))
-
-
-def largest_of(
-    active: Booleans,
-    counts: Array,
-    wraps: bool,
-    previous: Booleans,
-) -> Booleans:
-    """The taxels of the component that `edge.touch.region.largest_region` returns.
+) -> Iterator[tuple[Indices, int]]:
+    """Taxels, as flat indices of `active`, and peak of each component.
 
     Args:
         active: as for `components_of`.
         counts: (rows, cols) of the frame.
         wraps: as for `components_of`.
-        previous: (rows, cols) the region followed so far.
     """
     components = components_of(active, wraps)
-    areas = components.areas
-    largest = np.flatnonzero(areas == areas.max())
-    if len(largest) > 1:
-        overlaps = np.bincount(components.of_taxel, previous[active[:, :-1]])
-        peaks = _peaks(components, active, counts)
-        # The last key counts most; of equal components the first is taken.
-        largest = largest[np.lexsort((-peaks[largest], -overlaps[largest]))]
-    taxels = np.zeros_like(active)
-    taxels[active] = components.of_taxel == largest[0]
-    return taxels
+    order = components.of_taxel.argsort(kind="stable")
+    taxels = np.flatnonzero(active)[order]
+    parts = np.split(taxels, components.areas.cumsum()[:-1])
+    peaks = _peaks(components, active, counts).tolist()
+    return zip(parts, peaks, strict=False)  # without a component there is one part
 
 
-def largest_bits(
+def largest_of(
     on: Grid,
     active: Booleans,
     counts: Array,
     previous: int,
-) -> tuple[int, int]:
-    """Taxels and peak of the largest component.
+) -> tuple[Indices, int]:
+    """Taxels and peak, as of `all_of`, of the component that
+    `edge.touch.region.largest_region` returns.
 
     Args:
         on: the skin's grid, whose bits give taxels.
@@ -174,12 +144,14 @@ def largest_bits(
         counts: (rows, cols) of the frame.
         previous: the region followed so far.
     """
-    bits = on.pack(active)
-    if not bits & on.neighbours(bits):
-        # A flickering skin may have nothing but lone taxels, a hundred and more; this
-        # takes a tenth of the components' time.
-        lone = np.flatnonzero(on.unpack(bits & previous or bits))
-        index = int(lone[counts.reshape(-1)[lone].argmax()])
-        return on.bit(index), counts.item(index)
-    taxels = largest_of(active, counts, on.wraps, on.unpack(previous))
-    return on.pack(taxels), int(counts[taxels[:, :-1]].max())
+    components = components_of(active, on.wraps)
+    peaks = _peaks(components, active, counts)
+    areas = components.areas
+    largest = np.flatnonzero(areas == areas.max())
+    if len(largest) > 1:
+        before = on.unpack(previous)[active[:, :-1]]
+        overlaps = np.bincount(components.of_taxel, before)
+        # The last key counts most; of equal components the first is taken.
+        largest = largest[np.lexsort((-peaks[largest], -overlaps[largest]))]
+    taxels = np.flatnonzero(active)[components.of_taxel == largest[0]]
+    return taxels, int(peaks[largest[0]])

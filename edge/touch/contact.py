@@ -51,6 +51,7 @@ class FeatureSeries:
         beside: (n,) whether another region rises above the onset beside the contact.
         layout: the skin, with its thresholds.
         ended: the contact ended with the last frame.
+        speed: of the joints before onset, see `Contact`.
         zones: {zone: (n, 8)} whole numbers of each zone, see `edge.touch.zones`; 12
             with those of its shear.
         force_motion: (n,) as `motion`, of the force-weighted centroid, or None.
@@ -71,6 +72,7 @@ class FeatureSeries:
     beside: Booleans
     layout: SkinLayout
     ended: bool = False
+    speed: float = math.nan
     zones: dict[str, Integers] = field(default_factory=dict)
     force_motion: Floats | None = None
     taxels: Integers | None = None
@@ -130,6 +132,7 @@ class Measurer:
         motion: whether the contact's centroid is followed.
         force_motion: whether its force-weighted centroid is followed.
         zones: that are measured, or None.
+        joints: what reads the joint angles, or None.
         readers: {name in `FeatureSeries`: what reads the skin's cells, or the joint
             angles, of a frame}.
     """
@@ -150,6 +153,7 @@ class Measurer:
             from edge.touch.zones import Zones
 
             self.zones = Zones(layout, types)
+        self.joints: JointAngles | None = None
         self.readers: dict[str, Cells | JointAngles] = {}
         if not quantities.isdisjoint(("taxel_force", "taxel_kernels")):
             from edge.touch.cells import cells_for
@@ -158,7 +162,8 @@ class Measurer:
         if joints and any(feature.of_joints for feature in types):
             from edge.touch.joint_angles import JointAngles
 
-            self.readers["joints"] = JointAngles(joints)
+            self.joints = JointAngles(joints)
+            self.readers["joints"] = self.joints
 
 
 class Contact:
@@ -173,6 +178,7 @@ class Contact:
         chain: the arm that its motion is measured with; None where it is measured on
             the skin.
         ended: no more frames will come.
+        speed: of the joints before onset in radians a second; NaN where not known.
         late: it began before the first frame, or was set aside before.
         missing_taxels: a frame lacked taxels that are not known to be dead.
         missing_pose: a frame came without the joint angles that a feature needs.
@@ -195,6 +201,7 @@ class Contact:
         self.layout = measurer.layout
         self.chain = chain
         self.ended = False
+        self.speed = math.nan if measurer.joints is None else measurer.joints.speed
         self.late = False
         self.missing_taxels = False
         self.missing_pose = False
@@ -338,6 +345,7 @@ class Contact:
             sums=counted[:, 2:PLAIN],
             layout=self.layout,
             ended=self.ended,
+            speed=self.speed,
             zones={} if zones is None else zones.split(counted[:, PLAIN:]),
         )
 

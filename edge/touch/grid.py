@@ -12,7 +12,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from edge.arrays import Booleans
+from edge.arrays import Booleans, Indices
 
 MOST_STEPS = 32
 """Steps of one taxel that a flood takes; more would cost as much as labelling all."""
@@ -44,6 +44,12 @@ class Grid:
         packed = np.frombuffer(bits.to_bytes((size + 7) // 8, "little"), dtype=np.uint8)
         flat = np.unpackbits(packed, count=size, bitorder="little").view(np.bool_)
         return flat.reshape(self.rows, self.stride)[:, : self.cols]
+
+    def bits_at(self, indices: Indices) -> int:
+        """The set of flat indices (row * stride + col)."""
+        active = np.zeros(self.rows * self.stride, dtype=np.bool_)
+        active[indices] = True
+        return self.pack(active)
 
     def bit(self, index: int) -> int:
         """The taxel of a flat index (row * cols + col)."""

@@ -1,6 +1,7 @@
 """Joint angles: by the names of their joints, as features measure them, and as the pose
 that they make."""
 
+import math
 from collections.abc import Callable, Sequence
 from typing import Any
 
@@ -11,6 +12,9 @@ from edge.arrays import Floats
 from edge.elementary import MOST_RAD
 from edge.errors import InputError
 from edge.touch.frame import Frame
+
+APPROACH_S = 0.1
+"""Time over which the joints' speed before a contact is measured."""
 
 
 def joint_columns(names: Sequence[str], joints: Sequence[str]) -> list[int]:
@@ -37,10 +41,27 @@ class JointAngles:
 
     Attributes:
         count: angles of a frame.
+        speed: length of their change over the last tenth of a second or so, in radians
+            a second; NaN where not known.
     """
 
     def __init__(self, count: int) -> None:
         self.count = count
+        self.speed = math.nan
+        self._before: Frame | None = None
+
+    def watch(self, frame: Frame) -> None:
+        """Measure the speed, by every frame of the stream."""
+        before = self._before
+        if before is None:
+            self._before = frame
+        elif frame.t - before.t >= APPROACH_S:
+            self._before = frame
+            self.speed = math.nan
+            start = before.joints
+            end = frame.joints
+            if start is not None and end is not None and len(start) == len(end):
+                self.speed = math.dist(start, end) / (frame.t - before.t)
 
     def read(self, frame: Frame) -> Floats:
         """(count,) angles of a frame; NaN where they are not known.

@@ -169,12 +169,12 @@ class SkinLayout:
             values["onset_counts"] = table.whole("onset_counts", allowed=range(65536))
         highest = {
             "radius_m": LONGEST_M,
-            "counts_per_newton": math.inf,
+            "counts_per_newton": 1e9,
             "release_s": LONGEST_RELEASE_S,
         }
         for name, high in highest.items():
             if table.has(name):
-                values[name] = table.number(name, low=0.0, high=high, open_low=True)
+                values[name] = table.number(name, low=1e-9, high=high)
         if table.has("pitch_m"):
             values["pitch_m"] = _pitch(table)
         if table.has("axes") and table.whole("axes", allowed=(1, 3)) == 3:

@@ -1,145 +1,23 @@
-"""Taxels that stay above the threshold without a touch, as they are stuck or leant on,
-are set aside before contacts are followed."""
+"""Contacts, without what is above the threshold and is no touch."""
+
+from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from edge.arrays import Booleans, Integers
+from edge.arrays import Booleans
 from edge.touch.active import ActiveTaxels
 from edge.touch.contact import Contact
 from edge.touch.frame import Frame
-from edge.touch.layout import SkinLayout
 from edge.touch.track import ContactTracker, active_taxels
 
-STILL_S = 2.0
-"""A taxel whose count stays the same for so long is not touched. It takes a second more
-than contacts are followed, where that is longer."""
-EARLY_S = 0.3
-"""Seconds within which a touch that was under way in the first frame changes."""
-LONGEST_EARLY_S = 10.0
-"""Seconds of first frames that are kept while what is set aside may be a touch."""
-CHECK_S = 0.25
-"""Time between two looks at the counts."""
-STILL_SHARE = 0.05
-"""Part of its count by which a still taxel may change; noise may change it by half of
-the threshold."""
-MOVED_SHARE = 0.25
-"""Part of its count by which a taxel that was set aside changes where it is touched; at
-least the threshold."""
+if TYPE_CHECKING:
+    from edge.touch.aside import AsideTaxels
 
-
-@dataclass(frozen=True)
-class View:
-    """What of a frame is to be followed.
-
-    Attributes:
-        frame: of the skin.
-        active: its active taxels, without those that are set aside.
-        late: it shows a touch that was under way before it.
-    """
-
-    frame: Frame
-    active: ActiveTaxels
-    late: bool = False
-
-
-class StillTaxels:
-    """The taxels that are set aside, so that what happens beside them is followed.
-
-    What is above the threshold in the first frame is set aside at once: it may be a
-    stuck taxel, or a touch under way, which changes. Later a taxel is set aside once it
-    has been still. It is taken back when it falls to the threshold, or changes as in a
-    touch; where it then returns to its former count, it is set aside at once.
-
-    Attributes:
-        aside: (rows, cols), True on the taxels that are set aside.
-        touched: the last frame showed that they are touched, as they changed.
-        early: the first frames, while what is set aside may turn out to be a touch.
-    """
-
-    def __init__(self, layout: SkinLayout, horizon_s: float) -> None:
-        """Watch a skin on which contacts are followed for `horizon_s`."""
-        self.aside = np.zeros(layout.shape, dtype=np.bool_)
-        self.touched = False
-        self.early: list[View] = []
-        self._layout = layout
-        self._threshold = layout.threshold_counts
-        self._longest_s = min(horizon_s, LONGEST_EARLY_S)
-        self._began_s = math.nan
-        longest_s = horizon_s if math.isfinite(horizon_s) else 0.0
-        self._still_s = max(STILL_S, longest_s + 1.0)
-        self._reference = np.zeros(layout.shape, dtype=np.int64)
-        self._looks = np.zeros(layout.shape, dtype=np.int64)
-        """For how many looks each count has been the same."""
-        self._levels = np.zeros(layout.shape, dtype=np.int64)
-        """The counts of taxels that have been set aside; 0 of all others."""
-        self._next_s = -math.inf
-
-    def filter(self, frame: Frame) -> list[View]:
-        """What is to be followed with a frame, the frame's own view last.
-
-        Before it come the first frames, where it shows that what was set aside in them
-        is a touch.
-        """
-        active = active_taxels(frame, self._layout)
-        self._watch(frame, active)
-        age_s = frame.t - self._began_s
-        now = View(frame, active)
-        if not (self.touched or self.aside.any()):
-            self.early = []
-            return [now]
-        beside = active_taxels(frame, self._layout, self.aside)
-        if self.touched or self._grows(active, beside, age_s):
-            early = self.early if age_s <= EARLY_S else []
-            self.early = []
-            return [*early, now]
-        if age_s == 0.0 or (self.early and age_s <= self._longest_s):
-            self.early.append(View(frame, active, late=True))
-        return [View(frame, beside)]
-
-    def _grows(self, active: ActiveTaxels, beside: ActiveTaxels, age_s: float) -> bool:
-        """Whether what was set aside in the first frame soon grows."""
-        return age_s <= EARLY_S and bool(self.early) and _grown(active, beside)
-
-    def _watch(self, frame: Frame, active: ActiveTaxels) -> None:
-        """Set taxels aside or take them back, by a frame and its active taxels."""
-        self.touched = False
-        if self._next_s == -math.inf:
-            self._began_s = frame.t
-            self._set_aside(frame, active.mask)
-        elif self.aside.any():
-            self._take_back(frame, active.mask)
-        if frame.t >= self._next_s:
-            self._next_s = frame.t + CHECK_S
-            self._look(frame, active)
-
-    def _take_back(self, frame: Frame, active: Booleans) -> None:
-        change = np.abs(frame.counts - self._levels)
-        most = np.maximum(self._threshold, MOVED_SHARE * self._levels)
-        self.touched = bool((self.aside & (change > most)).any())
-        self.aside = self.aside & active & (not self.touched)
-
-    def _look(self, frame: Frame, active: ActiveTaxels) -> None:
-        if not active.bits:
-            self._looks[:] = 0
-            return
-        same = active.mask & self._near(frame, self._reference)
-        self._looks = np.where(same, self._looks + 1, 0)
-        np.copyto(self._reference, frame.counts, where=~same)
-        unchanged = active.mask & (self._levels > 0) & self._near(frame, self._levels)
-        still = unchanged | (self._looks * CHECK_S >= self._still_s)
-        if still.any() and not self.touched:
-            self._set_aside(frame, still)
-
-    def _near(self, frame: Frame, counts: Integers) -> Booleans:
-        most = np.maximum(0.5 * self._threshold, STILL_SHARE * counts)
-        return np.asarray(np.abs(frame.counts - counts) <= most)
-
-    def _set_aside(self, frame: Frame, taxels: Booleans) -> None:
-        np.copyto(self._levels, frame.counts, where=taxels & ~self.aside)
-        self.aside = self.aside | taxels
+LASTING_S = 1.25
+"""A contact that lasts for so long may be none."""
 
 
 class WatchfulTracker:
@@ -151,52 +29,69 @@ class WatchfulTracker:
 
     Attributes:
         tracker: follows the contacts.
-        still: the taxels that are set aside.
+        seen: the last frame as it was followed.
     """
 
     def __init__(self, tracker: ContactTracker) -> None:
         """Watch over a fresh tracker."""
         self.tracker = tracker
-        self.still = StillTaxels(tracker.layout, tracker.horizon_s)
+        self.seen: Frame | None = None
+        self._none = np.zeros(tracker.layout.shape, dtype=np.bool_)
+        self._begun_s = np.full(tracker.layout.shape, np.inf)
+        """When each taxel was first active, since none was for `release_s`."""
+        self._active_s = -math.inf
+        self._taxels: AsideTaxels | None = None
 
     @property
     def horizon_s(self) -> float:
         """As `ContactTracker.horizon_s`."""
         return self.tracker.horizon_s
 
+    @property
+    def aside(self) -> Booleans:
+        """(rows, cols), True on the taxels that are set aside, or will be once there is
+        a touch beside them."""
+        return self._none if self._taxels is None else self._taxels.aside
+
     def push(self, frame: Frame) -> list[Contact]:
         """As `ContactTracker.push`, without the taxels that are set aside."""
         self.tracker.check(frame)
-        contacts: list[Contact] = []
-        for view in self.still.filter(frame):
-            contacts = self._follow(view)
-        if contacts:
-            self.still.early = []
+        active = active_taxels(frame, self.tracker.layout)
+        if self._taxels is None and self._may_be_none(frame, active):
+            from edge.touch.aside import AsideTaxels  # most contacts are touches
+
+            self._taxels = AsideTaxels(self.tracker, frame, self._begun_s)
+        is_first = self.seen is None
+        self.seen = frame
+        if self._taxels is None:
+            contacts = self.tracker.follow(frame, active)
+            for contact in self.tracker.contacts if is_first else ():
+                contact.late = True
+            return contacts
+        contacts = self._taxels.follow(frame, active)
+        self.seen = self._taxels.seen
         return contacts
+
+    def _may_be_none(self, frame: Frame, active: ActiveTaxels) -> bool:
+        """Whether there is a contact in the first frame, or for long.
+
+        Where every taxel is in contact in the first frame, a firm hold is under way.
+        """
+        if frame.t - self._active_s > self.tracker.layout.release_s:
+            self._begun_s[:] = np.inf
+        if not active.bits:
+            return False
+        self._active_s = frame.t
+        np.minimum(self._begun_s, frame.t, out=self._begun_s, where=active.mask)
+        if self.seen is None:
+            readable = True if frame.valid is None else frame.valid
+            return bool((active.mask != readable).any())
+        return frame.t - float(self._begun_s.min()) >= LASTING_S
 
     def finish(self) -> list[Contact]:
         """The contacts of the first frame that never changed, where the stream has had
         no other contact."""
-        contacts: list[Contact] = []
-        for view in self.still.early:
-            contacts = self._follow(view)
-        self.still.early = []
-        return contacts
-
-    def _follow(self, view: View) -> list[Contact]:
-        contacts = self.tracker.follow(view.frame, view.active)
-        if view.late:
-            for contact in self.tracker.contacts:
-                contact.late = True
-        return contacts
+        return [] if self._taxels is None else self._taxels.finish()
 
 
 Tracker = ContactTracker | WatchfulTracker
-
-
-def _grown(active: ActiveTaxels, beside: ActiveTaxels) -> bool:
-    """Whether a region has both taxels that are set aside and others."""
-    aside = active.bits ^ beside.bits
-    return any(
-        region.bits & aside and region.bits & beside.bits for region in active.regions
-    )

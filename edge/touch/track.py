@@ -6,7 +6,6 @@ import math
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from edge.arrays import Booleans
 from edge.errors import InputError
 from edge.touch.active import ActiveTaxels, Region
 from edge.touch.contact import (
@@ -134,6 +133,18 @@ class ContactTracker:
         self.contacts = [contact for contact in contacts if not contact.ended]
         return self._confirmed(contacts)
 
+    def end(self, active: ActiveTaxels) -> list[Contact]:
+        """End the contact, unless some of the last frame's region is still active;
+        returned if it was confirmed. Of several contacts each ends by itself."""
+        goes_on = self.region is not None and self.region.bits & active.bits
+        if goes_on or self._max_contacts > 1:
+            return []
+        contacts = self.contacts
+        self.contacts = []
+        for contact in contacts:
+            contact.ended = True
+        return self._confirmed(contacts)
+
     def _confirmed(self, contacts: Sequence[Contact]) -> list[Contact]:
         """The contacts that have lasted long enough to count."""
         return [contact for contact in contacts if contact.frames >= self._debounce]
@@ -173,7 +184,9 @@ class ContactTracker:
             contact.ended = True
             return
         contact.frames += 1
-        if not confirmed or contact.age_s < self.horizon_s:
+        # A reading without contact replaces none of its instant.
+        counts = region is not None or age_s > contact.age_s
+        if counts and (not confirmed or contact.age_s < self.horizon_s):
             contact.add(frame, active, region, age_s)
         if region is not None:
             contact.touched_s = age_s
@@ -198,18 +211,15 @@ class ContactTracker:
         if frame.t < self._t:
             raise InputError(f"time goes back from {self._t} to {frame.t} s")
         self._t = frame.t
+        if self._measurer.joints is not None:
+            self._measurer.joints.watch(frame)
 
 
-def active_taxels(
-    frame: Frame, layout: SkinLayout, aside: Booleans | None = None
-) -> ActiveTaxels:
-    """The taxels of a frame above the threshold, without those that are set aside."""
-    valid = frame.valid
-    if aside is not None:
-        valid = ~aside if valid is None else valid & ~aside
+def active_taxels(frame: Frame, layout: SkinLayout) -> ActiveTaxels:
+    """The taxels of a frame above the threshold."""
     return ActiveTaxels(
         frame.counts,
         layout.threshold_counts,
-        valid=valid,
+        valid=frame.valid,
         wraps=layout.wraps,
     )

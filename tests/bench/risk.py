@@ -17,9 +17,10 @@ its nested accuracy. The row "export" has the interval that an export at the ful
 prints. The accuracy on other trials may lie outside it in one data set of twenty.
 
 The last table judges the confidence at the full window on new trials of known objects:
-its calibration error, and how many of them are flagged `unknown` where 2 % are asked
-for; in brackets, what four fifths of the sets give. Further rows are of data sets that
-are exported in full, on whose touches the board's own classifier decides.
+its calibration error, and how many of them are flagged `unknown` where 1 % are asked
+for. Further rows are of data sets that are exported in full but for four objects: the
+board's own classifier decides on fresh touches of the others, and of the four that it
+never met.
 """
 
 import tempfile
@@ -33,7 +34,7 @@ from joblib import cpu_count
 from numpy.typing import NDArray
 from scipy.stats import binom
 
-from edge.model.info import UNKNOWN
+from edge.early import fastest
 from edge.model.model import Model
 from edge.touch.features import SAMPLES, WINDOW_S
 from export.api import save
@@ -46,13 +47,14 @@ from train.data.feature_sets import expand
 from train.data.parts import part
 from train.fitting import fit
 from train.model.held_out import answers
+from train.model.novelty import beyond
 from train.model.rules import RISK
-from train.model.stopping import unlike
 from train.report.work import Workers
 from train.simulate import scene as scenes
 from train.simulate.run import write
 from train.tradeoff.front import NAMES, ParetoFront
 
+NEVER_MET = ("fern", "foam block", "tool box", "plastic bin")
 POINTS_S = (0.2, 0.4, 0.6, 0.8, 1.0, 1.2)
 ERRORS = (0.05, 0.1, 0.2)
 LATE_S = 0.05
@@ -142,7 +144,7 @@ def judged(drawn, labels):
     model = fitted.sequential
     new = drawn.pooled(POINTS_S, rest, fitted.dataset.names)
     hits, confidences, courses = model.judged(new, y)
-    unknown = unlike(model.novelty_, model.space_.scores(new))[-1]
+    unknown = beyond(model.remoteness_.limits, model.space_.scores(new).remoteness)[-1]
     certified = []
     fronts = []
     trusted = []
@@ -158,12 +160,12 @@ def certificates(task, stopping, course):
     """A row for each request: the certified error, the share wrong, and the promised
     and the realised mean seconds, which are missing where the request is refused. The
     first request is the smallest error that is certified."""
-    requests = {"the smallest": stopping.smallest_error}
+    requests = {"the smallest": stopping.rules[0].error}
     requests |= {f"{error:g}": error for error in ERRORS}
     for name, error in requests.items():
         row = {"task": task, "asked": name, "error": error}
         row |= dict.fromkeys(("wrong", "promised, s", "realised, s"), np.nan)
-        rule = stopping.rule(error)
+        rule = fastest(stopping, error)
         if rule is not None:
             at, wrong = course.under(rule)
             row["wrong"] = wrong.mean()
@@ -185,35 +187,38 @@ def front_points(task, points, right):
 
 def trust(right, confidence, unknown):
     """Of new trials of known objects (m,): their mean confidence, the share that is
-    right, the expected calibration error in ten ranges, the Brier score, and the share
-    that counts as unknown."""
+    right, the expected calibration error in ten ranges, and the share that counts as
+    unknown."""
     ranges = np.minimum((confidence * BINS).astype(int), BINS - 1)
     gaps = np.bincount(ranges, confidence - right)
     return {
         "mean confidence": confidence.mean(),
         "right": right.mean(),
         "calibration error": np.abs(gaps).sum() / len(right),
-        "Brier score": ((confidence - right) ** 2).mean(),
         "flagged unknown": unknown.mean(),
     }
 
 
 def exported(seed):
-    """A row of `trust` for each task of a full export of a seed's data set, on fresh
-    touches of its objects."""
+    """Rows of `trust` for each task of a full export of a seed's data set without some
+    objects, on fresh touches of the others and of these; an unknown one is answered
+    wrongly, with no confidence."""
     with tempfile.TemporaryDirectory() as folder:
-        write(scenes.load(SCENE, seed=seed), f"{folder}/data")
+        scene = scenes.load(SCENE, seed=seed)
+        known = [item for item in scene.objects if item.name not in NEVER_MET]
+        write(replace(scene, objects=known), f"{folder}/data")
         save(f"{folder}/model.onnx", fit(f"{folder}/data", jobs=1))
         model = Model(f"{folder}/model.onnx")
-    fresh = scenes.load(SCENE, seed=FRESH_SEED, count=FRESH)
-    rows = decisions(model, fresh_touches(fresh)).drop_duplicates(["task", "touch"])
-    rows["unknown"] = [UNKNOWN in flags for flags in rows["flags"]]
-    rows["right"] = [answer.label for answer in rows["decision"]] == rows["truth"]
-    judged_rows = []
-    for task, of_task in rows.groupby("task", sort=False):
-        columns = (of_task[name] for name in ("right", "confidence", "unknown"))
-        judged_rows.append({"task": f"{task}, full export", **trust(*columns)})
-    return judged_rows
+    fresh = fresh_touches(scenes.load(SCENE, seed=FRESH_SEED, count=FRESH))
+    rows = decisions(model, fresh).drop_duplicates(["task", "touch"])
+    rows["unknown"] = ["unknown" in flags for flags in rows["flags"]]
+    rows["right"] = rows["label"] == rows["truth"]
+    rows["new"] = [fresh[i].labels["object"] in NEVER_MET for i in rows["touch"]]
+    return [
+        {"task": f"{task}, {'never met' if new else 'full export'}"}
+        | trust(of["right"], of["confidence"], of["unknown"])
+        for (task, new), of in rows.groupby(["task", "new"], sort=False)
+    ]
 
 
 def drawn_sets(batches, count):
@@ -288,11 +293,7 @@ def confidence(rows):
     """Means of what the confidence was worth."""
     means = rows.drop(columns="task").mean()
     row = {"sets": len(rows)}
-    row |= {name: f"{mean:.3f}" for name, mean in means.items()}
-    flagged = rows["flagged unknown"]
-    low, high = flagged.quantile((0.1, 0.9))
-    row[flagged.name] = f"{flagged.mean():.1%} ({low:.1%} to {high:.1%})"
-    return row
+    return row | {name: f"{mean:.3f}" for name, mean in means.items()}
 
 
 if __name__ == "__main__":

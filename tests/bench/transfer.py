@@ -16,7 +16,6 @@ import numpy as np
 import pandas as pd
 from joblib import cpu_count
 
-from edge.model.info import UNKNOWN
 from edge.model.model import Model
 from edge.tools.replay import Summary, decide
 from tests.bench import tables
@@ -140,7 +139,7 @@ def judge(model, touch):
     summary.add(recording.labels, events)
     row = {"trials": habit, "kind": recording.labels["object"]}
     row |= {f"{task} right": summary.right(task)[0] for task in TASKS}
-    row["unknown"] = int(any(UNKNOWN in event.get("flags", ()) for event in events))
+    row["unknown"] = int(any("unusual" in event.get("flags", ()) for event in events))
     return row | {"number": 1}
 
 

@@ -1,14 +1,17 @@
 """Answers about a contact, and the flags that say what there is to doubt."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
+from edge.answers import contact_doubts
 from edge.classifier import Classifier
 from edge.errors import InputError
 from edge.events import Decided
 from edge.model.model import Model
+from tests.edge.touch.test_joint_doubts import RATE, series, stopped
 
 
 def decided(model, recording):
@@ -52,9 +55,10 @@ def test_features_far_outside_of_training_flag_the_decision_or_give_no_label(
     labelled,
 ):
     recording = make_touch(kind="soft", seed=99)
-    skin = {**recording.meta["skin"], "counts_per_newton": scale}
-    strong = replace(recording, meta={**recording.meta, "skin": skin})
-    events = decided(model, strong)
+    layout = replace(recording.layout, counts_per_newton=scale)
+    classifier = Classifier(model, layout)
+    events = [event for frame in recording for event in classifier.push(frame)]
+    events = [event for event in events if isinstance(event, Decided)]
     assert [e.flags for e in events] == [("out_of_range",)] * 2
     assert [bool(e.label) for e in events] == [labelled] * 2
     assert [bool(e.decision) for e in events] == [labelled] * 2
@@ -81,11 +85,40 @@ def test_a_model_that_cannot_be_run_is_an_error_and_no_flag(
         (lambda t: t, False),
         (lambda t: 1e3 * t, True),  # milliseconds
         (lambda t: np.where(t > 0.235, t + 5.0, t), True),
-        (lambda t: np.where(t > 0.5, t + 0.11, t), True),
-        (lambda t: np.where(t > 0.5, t + 0.08, t), False),
+        (lambda t: np.where(t > 0.5, t + 0.05, t), True),
+        (lambda t: np.where(t > 0.5, t + 0.03, t), False),
     ],
 )
 def test_a_gap_in_the_window_flags_the_decision(model, make_touch, damage, flagged):
     recording = make_touch()
     events = decided(model, replace(recording, t=damage(recording.t)))
     assert ["gap" in event.flags for event in events] == [flagged] * 2
+
+
+@pytest.mark.parametrize("label", ["soft 0", "none"])
+def test_a_second_region_is_a_doubt_unless_the_named_label_often_had_one(
+    exported,
+    make_touch,
+    label,
+):
+    model = Model(exported / "model.onnx")
+    model.info = replace(model.info, several_labels=(label,))
+    touch = make_touch(kind="soft", seed=99)
+    touch.frames[:, :2, 12:14] = 2 * touch.frames.max(axis=(1, 2))[:, None, None] // 3
+    events = decided(model, touch)
+    assert [event.label for event in events] == ["soft-fixed", "soft 0"]
+    assert ["several" in event.flags for event in events] == [label == "none"] * 2
+
+
+def test_joint_angles_are_compared_with_those_of_training(model):
+    contact = SimpleNamespace(
+        missing_taxels=False, missing_pose=False, late=False, chain=None
+    )
+    usual = {"joints": 2, "still_s": (0.0, 0.0), "speeds": (0.4, 0.6)}
+    info = replace(model.info, **usual)
+    doubts = contact_doubts(info, contact, series(lambda t: 0.5 * RATE * t), 1.2)
+    assert doubts["speed"]
+    assert not doubts["still_joints"]
+    doubts = contact_doubts(info, contact, series(stopped(0, 0.5)), 1.2)
+    assert doubts["still_joints"]
+    assert not doubts["speed"]

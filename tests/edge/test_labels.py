@@ -1,6 +1,6 @@
 """A category is softness by mobility."""
 
-from edge.labels import CATEGORY
+from edge.labels import CATEGORY, plain
 
 WHOLE = {"category": "soft-fixed", "softness": "soft", "mobility": "fixed"}
 
@@ -20,3 +20,9 @@ def test_a_label_that_a_person_gave_is_not_replaced():
     contradictory = {**WHOLE, "category": "rigid-fixed"}
     assert CATEGORY.completed(contradictory) == contradictory
     assert CATEGORY.label(contradictory) == "soft-fixed"
+
+
+def test_what_a_model_could_not_hold_is_read_without_it_and_said(caplog):
+    labels = {"object ": "tin\u00a0can", "softness": "\u200dsoft"}
+    assert plain(labels, "a.npz") == {"object": "tin_can", "softness": "_soft"}
+    assert caplog.text.count("a.npz: the labels") == 1

@@ -18,6 +18,7 @@ OLD = time.time() - 60.0
 
 
 def left_by_a_dead_run(folder):
+    folder.mkdir(parents=True, exist_ok=True)
     path = folder / f"{PREFIX}0123456789abcdef"
     path.write_bytes(b"half of a file")
     os.utime(path, (OLD, OLD))

@@ -3,13 +3,17 @@
 import hashlib
 from dataclasses import replace
 
+import pytest
+
 import export
 import train
 from edge.classifier import Classifier
+from edge.errors import InputError
 from edge.model.model import Model
 from edge.model.verify import verify
 from edge.recording import load
 from edge.saving import save
+from export import api
 from train.model.pipeline import ContactClassifier
 from train.report.summary import names, warnings
 
@@ -23,6 +27,17 @@ def test_a_fitted_model_is_saved_with_its_golden_outputs(fitted, tmp_path):
     assert task.projection == "pca"
     assert task.left_out == "trial"
     assert task.accuracy == fitted.chosen["object"].accuracy.accuracy
+
+
+def test_a_model_that_cannot_be_read_leaves_the_former_one(
+    fitted, tmp_path, monkeypatch
+):
+    path = tmp_path / "model.onnx"
+    path.write_bytes(b"former")
+    monkeypatch.setattr(api, "to_onnx", lambda *words: b"no model")
+    with pytest.raises(InputError, match="not an ONNX model"):
+        export.save(path, fitted)
+    assert path.read_bytes() == b"former"
 
 
 def test_a_model_has_a_name_a_version_and_the_names_of_its_trials(

@@ -12,7 +12,7 @@ from onnxruntime import GraphOptimizationLevel
 
 import train
 from edge.classifier import Classifier
-from edge.early import stopping_rules
+from edge.early import fastest, is_fixed, stopping_rules
 from edge.errors import InputError, OutOfRange
 from edge.events import Decided
 from edge.model.model import Model
@@ -51,7 +51,7 @@ def early(folder):
 @pytest.fixture
 def error(early):
     """The smallest error that is certified for category."""
-    return early.info.stopping["category"].smallest_error
+    return early.info.stopping["category"].rules[0].error
 
 
 def decided(model, recording, error):
@@ -181,7 +181,7 @@ def test_the_board_stops_where_the_rule_does(early, make_touch, error):
         touch = make_touch(kind="soft", seed=seed)
         decision = decided(early, touch, error)["category"].to_dict()
         assert decision["window_s"] in early.decision_points_s[: rule.last + 1]
-        assert decision["stopped_by"] == ("window" if rule.fixed else "confidence")
+        assert decision["stopped_by"] == ("window" if is_fixed(rule) else "confidence")
         assert decision["error"] == error
         assert 0.0 <= decision["confidence"] <= 1.0
 
@@ -249,7 +249,7 @@ def hasty(early, monkeypatch):
         rule = replace(stopping.rules[0], confidence=0.0)
         hurried = replace(stopping, rules=(rule,))
         monkeypatch.setitem(early.info.stopping, task, hurried)
-        smallest.append(hurried.smallest_error)
+        smallest.append(rule.error)
     return early, max(smallest)
 
 
@@ -261,8 +261,8 @@ def strange(make_touch):
 
 
 def stops_of(events):
-    """The windows of decisions, and whether they are flagged as unknown."""
-    return {(event.window_s, "unknown" in event.flags) for event in events.values()}
+    """The windows of decisions, and whether they are flagged as unusual."""
+    return {(event.window_s, "unusual" in event.flags) for event in events.values()}
 
 
 def test_a_touch_like_others_does_not_wait(hasty, make_touch):
@@ -277,15 +277,23 @@ def test_a_touch_unlike_all_others_waits_and_is_flagged(hasty, strange):
     assert stops_of(decided(model, strange, None)) == {(1.2, True)}
 
 
-def test_a_touch_unlike_all_others_names_no_object_but_says_what_it_is_like(
-    hasty, strange
+@pytest.mark.parametrize("early_ones", [True, False])
+def test_an_unknown_thing_has_no_name_but_a_kind_at_once(
+    hasty, make_touch, monkeypatch, early_ones
 ):
     model, error = hasty
-    events = decided(model, strange, error)
-    assert model.info.novelty.task == "object"
-    assert events["object"].label == "unknown"
+    stopping = model.info.stopping["object"]
+    nowhere = replace(stopping.remoteness, limits=(0.0, 0.0, 0.0))
+    unmet = replace(stopping, remoteness=nowhere)
+    monkeypatch.setitem(model.info.stopping, "object", unmet)
+    touch = make_touch(kind="hard", seed=50)
+    events = decided(model, touch, error if early_ones else None)
+    assert events["object"].label is None
+    assert events["object"].confidence == 0.0
+    assert events["object"].flags == ("unknown",)
+    assert events["object"].window_s == (0.3 if early_ones else 1.2)
     assert events["category"].label == "rigid-fixed"
-    assert decided(model, strange, None)["object"].label != "unknown"
+    assert "unknown" not in events["category"].flags
 
 
 def test_an_error_that_no_task_certifies_is_refused_with_what_would_do(early):
@@ -364,16 +372,17 @@ def test_the_board_decides_as_the_trials_that_certified_its_rules_were(
         for task in model.info.tasks
     }
     _, _, courses = fitted.sequential.judged(np.array(vectors), truth)
-    error = model.info.stopping["category"].smallest_error
+    error = model.info.stopping["category"].rules[0].error
     for task, course in courses.items():
-        at, wrong = course.under(model.info.stopping[task].rule(error))
+        at, wrong = course.under(fastest(model.info.stopping[task], error))
         for i, recording in enumerate(recordings):
             event = decided(model, recording, error)[task]
             assert event.window_s == model.decision_points_s[at[i]]
             assert (event.label != truth[task][i]) == wrong[i]
 
 
-def test_the_graph_scores_novelty_as_the_estimator_does(early, tmp_path):
+@pytest.mark.parametrize("kind", ["novelty", "remoteness"])
+def test_the_graph_scores_doubt_as_the_estimator_does(early, tmp_path, kind):
     rng = np.random.default_rng(4)
     X = rng.normal(size=(3, 60, early.info.width))
     labels = np.repeat(["a", "b", "c"], 20)
@@ -382,10 +391,10 @@ def test_the_graph_scores_novelty_as_the_estimator_does(early, tmp_path):
     sequential, _ = fitted_model(path, early.info, choices, X, {"t": labels})
     vectors = rng.normal(size=(9, early.info.width))
     vectors *= 10.0 ** np.arange(-2, 7)[:, None]
-    scores = sequential.space_.scores(np.stack([vectors] * 3))
+    scores = getattr(sequential.space_.scores(np.stack([vectors] * 3)), kind)
     assert scores.min() > 0.0
     for engine in ("onnxruntime", "numpy"):
         loaded = Model(path, engine)
         for point, expected in enumerate(scores.tolist()):
-            outputs = [float(loaded.run(v[None], point)["novelty"][0]) for v in vectors]
+            outputs = [float(loaded.run(v[None], point)[kind][0]) for v in vectors]
             assert outputs == expected

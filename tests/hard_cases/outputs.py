@@ -5,6 +5,7 @@ states. It shares no code with the graph, with `train` or with `edge`: it comput
 whole numbers and fractions, and rounds where IEEE 754 says that an operation rounds.
 """
 
+import math
 from fractions import Fraction
 from functools import cache
 
@@ -101,7 +102,7 @@ class Whole:
         cut = np.any([projected.cut for projected in spaces.values()], axis=0)
         expected = {
             "out_of_range": cut.astype(np.float64),
-            "novelty": self._novelty(vectors, point),
+            **self._doubt(vectors, point),
         }
         for task in CHOICES:
             points = spaces[fitted.tasks_[task].space].units
@@ -137,7 +138,7 @@ class Whole:
         named = zip(TASK_OUTPUTS, columns_of, strict=True)
         return {f"{task}_{end}": np.array(column) for end, column in named}
 
-    def _novelty(self, vectors, point):
+    def _doubt(self, vectors, point):
         space = self.fitted.space_
         at = space.points[point]
         steps = exact.rounded((vectors - at.mean) * at.gain)
@@ -149,13 +150,22 @@ class Whole:
         places = exact.rounded(inside @ whitening, Fraction(2) ** -at.shift)
         places = np.clip(places, -int(FARTHEST), int(FARTHEST))
         rows = exact.multiples(at.rows, 1.0)
-        scores = []
+        quarters = exact.multiples(4.0 * at.weights, 1.0)
+        novelty = []
+        remoteness = []
         for outside, place in zip(squares.tolist(), places, strict=True):
-            nearest = min(((rows - place) ** 2).sum(axis=1).tolist())
+            apart = rows - place
+            nearest = min((apart**2).sum(axis=1).tolist())
+            weighted = ((apart * quarters) ** 2).sum(axis=1).tolist()
+            scaled = [
+                float(Fraction(square, 16) * Fraction(near))
+                for square, near in zip(weighted, at.nearness.tolist(), strict=True)
+            ]
+            remoteness.append(math.sqrt(min(scaled)))
             lengths = exact.root(max(outside, 1)), exact.root(nearest)
             product = float(Fraction(lengths[0]) * Fraction(lengths[1]))
-            scores.append(float(Fraction(product) * Fraction(at.unit)))
-        return np.array(scores)
+            novelty.append(float(Fraction(product) * Fraction(at.unit)))
+        return {"novelty": np.array(novelty), "remoteness": np.array(remoteness)}
 
 
 def _far(label, labels, squares, scale):
@@ -265,7 +275,7 @@ def confidence_error(kind, point, factor, seed):
             with mpmath.workdps(50):
                 far = [mpf(float(d)) for d in decision.label_distances]
                 rival = min(d for i, d in enumerate(far) if i != label)
-                typical = mpf(info.novelty.limits[point][0])
+                typical = mpf(info.novelty.typical[point])
                 novelty = mpf(decision.novelty) / typical
                 excess = mpmath.log(novelty) if novelty > 1 else mpf(0)
                 terms = [
@@ -275,6 +285,8 @@ def confidence_error(kind, point, factor, seed):
                 ]
                 log_odds = sum(terms)
                 true = 1 / (1 + mpmath.exp(-log_odds))
+                if rule.remoteness is not None:
+                    true *= rule.remoteness.known(point, decision.remoteness)
                 # An ulp of each term moves the probability by p (1 - p) of it.
                 resolved = 1 + true * (1 - true) * sum(map(abs, terms))
                 error = abs(mpf(decision.confidence) - true) / resolved

@@ -49,10 +49,18 @@ WITH_SHEAR = (
 )
 """Those that recordings of a skin of three axes have besides, with or without joint
 angles."""
+OF_SKIN = (
+    ("contact", "moments"),
+    ("moments", "zone_kernels"),
+    ("taxels",),
+    ("sqrt_taxels",),
+    ("kernels",),
+    ("taxels", "kernels"),
+)
+OF_JOINTS = (("joints",), ("joints", "posture"))
+"""For known things, each of `OF_SKIN` is a candidate with each of these, and with shear
+and without, where the recordings have them."""
 EARLY_WITH_JOINTS = (
-    ("contact", "joints"),
-    ("moments", "joints"),
-    ("contact", "moments", "joints"),
     ("contact", "sqrt_joints"),
     ("sqrt_joints",),
 )
@@ -88,6 +96,7 @@ class Candidate:
         grids: the settings tried with them.
         full: whether it is tried at the full window.
         early: whether it is tried at early decision points.
+        known: whether it is tried for known things alone, where no groups are left out.
     """
 
     sets: tuple[str, ...]
@@ -95,6 +104,7 @@ class Candidate:
     grids: tuple[SearchGrid, ...]
     full: bool = True
     early: bool = False
+    known: bool = False
 
     @property
     def name(self) -> str:
@@ -162,20 +172,26 @@ def candidates(
     paper's three features are tried with more scalings and numbers where you ask for
     these features only. Beside other candidates the best of so many settings would win
     by chance. Methods II and III are left out, as Method I and no scaling have the same
-    neighbours. The discriminants of all tasks side by side tell known things best, so
-    they are tried where no group is left out. Where `kinds_of` names kinds (`drawn`)
-    only what carries over to other skins and arms is tried.
+    neighbours. Where `kinds_of` names kinds (`drawn`) only what carries over to other
+    skins and arms is tried.
     """
     mode = Mode.drawn(joints) if drawn else Mode.usual(joints, shear, quick)
-    full = mode.full if fixed.features is None else [tuple(fixed.features)]
-    early = [] if fixed.asks else mode.early
+    mode = mode.asked(fixed)
     projections = KINDS if fixed.projection is None else (fixed.projection,)
+    every = dict.fromkeys((*mode.full, *mode.early, *mode.known))
     combinations = []
-    for sets, kind in product(dict.fromkeys((*full, *early)), projections):
+    for sets, kind in product(every, projections):
         if fixed.asks or mode.tries(kind, sets):
             grid = _grid(sets, kind, fixed, mode)
             grids = _scaled(_with_targets(grid, y, mode), sets, fixed)
-            candidate = Candidate(sets, kind, grids, sets in full, sets in early)
+            candidate = Candidate(
+                sets,
+                kind,
+                grids,
+                full=sets in (*mode.full, *mode.known),
+                early=sets in mode.early,
+                known=sets not in (*mode.full, *mode.early),
+            )
             combinations.append(candidate)
     return combinations
 
@@ -188,6 +204,7 @@ class Mode:
         full: feature sets that are tried together at the full window.
         early: those of early decision points; none where these have the settings of the
             full window.
+        known: those that are tried for known things besides.
         shrinkages: of discriminants.
         components: numbers of coordinates.
         most_directions: of discriminants; None for all.
@@ -197,6 +214,7 @@ class Mode:
 
     full: Sequence[tuple[str, ...]]
     early: Sequence[tuple[str, ...]]
+    known: Sequence[tuple[str, ...]]
     shrinkages: tuple[float, ...]
     components: tuple[int, ...]
     most_directions: int | None
@@ -209,6 +227,7 @@ class Mode:
         return cls(
             full=[DRAWN_WITH_JOINTS if joints else DRAWN],
             early=[],
+            known=[],
             shrinkages=DRAWN_SHRINKAGES,
             components=DRAWN_COMPONENTS,
             most_directions=DRAWN_COMPONENTS[-1],
@@ -226,12 +245,20 @@ class Mode:
         return cls(
             full=[*usual[: QUICK if quick else None], *sheared],
             early=[*EARLY_WITH_JOINTS, *sheared] if has_early else [],
+            known=[] if quick else _beside_every_other(joints, shear),
             shrinkages=QUICK_SHRINKAGES if quick else SHRINKAGES,
             components=COMPONENTS,
             most_directions=None,
             components_alone=not quick,
             together=True,
         )
+
+    def asked(self, fixed: Fixed) -> Mode:
+        """The same mode, with the features that are asked for in place of others."""
+        if not fixed.asks:
+            return self
+        full = self.full if fixed.features is None else [tuple(fixed.features)]
+        return replace(self, full=full, early=[], known=[])
 
     def tries(self, kind: str, sets: Sequence[str]) -> bool:
         """Whether a projection of some feature sets is tried by default.
@@ -243,7 +270,17 @@ class Mode:
         """
         if sets == ("paper",):
             return kind == "pca"
-        return kind == "lda" or self.components_alone
+        return kind == "lda" or (self.components_alone and sets in self.full)
+
+
+def _beside_every_other(joints: bool, shear: bool) -> list[tuple[str, ...]]:
+    """Each of `OF_SKIN` beside what else the recordings have."""
+    of_joints = OF_JOINTS if joints else ((),)
+    of_shear = ((), ("shear",)) if shear else ((),)
+    return [
+        (*skin, *tangential, *angles)
+        for skin, tangential, angles in product(OF_SKIN, of_shear, of_joints)
+    ]
 
 
 def _grid(sets: tuple[str, ...], kind: str, fixed: Fixed, mode: Mode) -> SearchGrid:

@@ -19,7 +19,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from itertools import combinations_with_replacement
 from typing import Any
 
 import numpy as np
@@ -29,12 +28,19 @@ from numpy.typing import NDArray
 from edge.arrays import Booleans, Floats, Integers
 from edge.errors import InputError
 from edge.statistics import wilson
-from train.choose.crossval import votes_right
-from train.choose.search import Decomposition, SearchGrid
+from train.choose.answers import answers_without
+from train.choose.halving import (
+    Pair,
+    choices_of,
+    fold_pairs,
+    folds_near,
+    rungs,
+)
+from train.choose.rule import MOST_ACCURATE, Rule
+from train.choose.search import SearchGrid
 from train.data.vectors import Strings, Vectors
 from train.model.pipeline import Choice
-from train.model.scaling import centred_and_scaled, finite
-from train.threads import single_thread
+from train.model.scaling import finite
 
 VARIANCE = 2.5
 """Variance of the nested accuracy around the exported model's accuracy on other trials,
@@ -95,130 +101,7 @@ class Promise(Result):
         return wilson(self.right / self.variance, self.total / self.variance)
 
 
-@dataclass(frozen=True)
-class _Fit:
-    """Trials that candidates are fitted on, and those that they answer.
-
-    Attributes:
-        vectors: of all trials.
-        classes: {task: (n,) class indices, -1 for a trial without a label}.
-        train, test: the trials.
-    """
-
-    vectors: Vectors
-    classes: Mapping[str, Integers]
-    train: Integers
-    test: Integers
-
-    def labelled(self, grid: SearchGrid) -> list[tuple[list[str], Integers]]:
-        """A grid's tasks, by the `train` trials that have labels for them."""
-        by_trials: dict[bytes, tuple[list[str], Integers]] = {}
-        for task, labels in self.classes.items():
-            if grid.is_for(task):
-                trials = self.train[labels[self.train] >= 0]
-                tasks, _ = by_trials.setdefault(trials.tobytes(), ([], trials))
-                tasks.append(task)
-        return list(by_trials.values())
-
-    def decomposition(self, grid: SearchGrid, rows: Integers) -> Decomposition:
-        """The scaled vectors of a grid's features, fitted on some trials."""
-        vectors = self.vectors.of(grid.features)
-        mean, gain, scaled = centred_and_scaled(
-            vectors.X[rows],
-            grid.scaling,
-            vectors.features,
-            vectors.columns,
-        )
-        labels_of = {task: labels[rows] for task, labels in self.classes.items()}
-        new = (vectors.X[self.test] - mean) * gain
-        return Decomposition(scaled, new, labels_of)
-
-    def right(
-        self,
-        task: str,
-        grid: SearchGrid,
-        neighbours: Integers,
-        members: Integers,
-    ) -> Booleans:
-        """(candidates, test) whether a grid's candidates are right, by the neighbours
-        among some of the trials."""
-        labels = self.classes[task]
-        right = votes_right(neighbours, labels[members], labels[self.test])
-        places = [min(k, right.shape[-1]) - 1 for k in grid.neighbours]
-        # One row for each candidate: for each projection, each k.
-        rows = right[..., places].transpose(0, 2, 1)
-        return np.asarray(rows.reshape(-1, len(self.test)))
-
-
-def _answers(
-    vectors: Vectors,
-    classes: Mapping[str, Integers],
-    left_out: Booleans,
-    grids: Sequence[SearchGrid],
-) -> dict[str, Booleans]:
-    """{task: (candidates, test) whether each candidate is right} of the fit without
-    some trials, by a mask (n,), which answers these."""
-    fit = _Fit(vectors, classes, np.flatnonzero(~left_out), np.flatnonzero(left_out))
-    answers: dict[str, list[Booleans]] = {task: [] for task in classes}
-    decomposed = None
-    with single_thread():
-        for grid in grids:
-            for tasks, members in fit.labelled(grid):
-                # Neighbouring grids often differ in the projection alone.
-                scaled = grid.scaling, grid.features, members.tobytes()
-                if decomposed != scaled:
-                    decomposed = scaled
-                    decomposition = fit.decomposition(grid, members)
-                neighbours = None
-                for task in tasks:
-                    if neighbours is None or (
-                        grid.projection == "lda" and not grid.targets
-                    ):
-                        neighbours = decomposition.neighbours(grid, task)
-                    answers[task].append(fit.right(task, grid, neighbours, members))
-    return {task: np.concatenate(right) for task, right in answers.items()}
-
-
-@dataclass(frozen=True)
-class Rule:
-    """How one of several candidates is chosen: the cheapest within one standard error
-    of the best in cross-validation.
-
-    The error is that of the difference to the best one on the same trials, which is
-    smaller than the errors of the two accuracies, as candidates often err on the same
-    trials.
-
-    Attributes:
-        prices: (candidates,) of each. At equal price the most accurate counts, then the
-            first. Without prices the most accurate of all is taken.
-        allowed: the candidates to choose from; all where None.
-        margin: loss of accuracy that is accepted for a lower price, whatever the
-            standard error.
-    """
-
-    prices: Integers | None = None
-    allowed: Integers | None = None
-    margin: float = 0.0
-
-    def choose(self, right: Booleans | Floats) -> int:
-        """The candidate chosen by answers (candidates, n): whether they are right, or
-        what share of them."""
-        candidates = np.arange(len(right)) if self.allowed is None else self.allowed
-        means = right[candidates].mean(axis=1)
-        if self.prices is None:
-            return int(candidates[means.argmax()])
-        prices = self.prices[candidates]
-        best = np.array(
-            [np.where(prices == p, means, -1.0).argmax() for p in np.unique(prices)]
-        )
-        answers = right[candidates[best]].astype(np.float64)
-        worse = answers[means[best].argmax()] - answers
-        error = worse.std(axis=1) / np.sqrt(right.shape[1])
-        within = worse.mean(axis=1) <= np.maximum(error, self.margin)
-        return int(candidates[best[within.argmax()]])
-
-
-MOST_ACCURATE = Rule()
+RuleOf = Callable[[Sequence[Choice]], Rule]
 
 
 @dataclass(frozen=True)
@@ -230,11 +113,15 @@ class AnswerTable:
         choices: {task: the candidates}.
         right: {task: (folds, candidates, n)} whether the fit without a fold, and
             without the trial's own fold, answers the trial rightly; True for trials
-            that are not tested. In an `averaged` table, the share of right answers.
+            that are not tested.
         tested: {task: (n,) whether a trial has a label and a fold}; all where a task
             has no entry.
         repeated: tables of the same candidates by other folds, whose answers to
             left-out trials count in the choice by all trials.
+        grids: {task: (candidates,) the number of each one's grid}.
+        running: {task: (folds + 1, candidates) whether each runs in the choice without
+            a fold, and in that by all trials}; all where a task has no entry. What was
+            dropped counts as wrong.
     """
 
     folds: Integers
@@ -242,19 +129,50 @@ class AnswerTable:
     right: dict[str, NDArray[Any]] = field(repr=False)
     tested: Mapping[str, Booleans] = field(default_factory=dict, repr=False)
     repeated: tuple[AnswerTable, ...] = ()
+    grids: Mapping[str, Integers] = field(default_factory=dict, repr=False)
+    running: Mapping[str, Booleans] = field(default_factory=dict, repr=False)
 
-    def enter(self, pair: tuple[int, int], answers: Mapping[str, Booleans]) -> None:
+    def fitted(self, pair: Pair, task: str) -> Booleans:
+        """(candidates,) whether a fit is made for each: where it runs in a choice that
+        the fit serves."""
+        choices = list(choices_of(pair, len(fold_numbers(self.folds))))
+        return np.asarray(self.running[task][choices].any(axis=0))
+
+    def enter(self, pair: Pair, answers: Mapping[str, Booleans]) -> None:
         """Take in the answers {task: (candidates, tests)} of the fit without a pair of
         folds to the trials of both."""
         folds = self.folds[np.isin(self.folds, pair)]
         for task, right in answers.items():
+            fitted = self.fitted(pair, task)
             # For the one fold these are answers to the other, and the other way round.
             for without, tested in {pair, pair[::-1]}:
                 in_fold = self.folds == tested
                 untested = ~self.tested[task][in_fold]
-                self.right[task][without][:, in_fold] = (
+                self.right[task][without][np.ix_(fitted, in_fold)] = (
                     right[:, folds == tested] | untested
                 )
+
+    def drop(self, reach: int, rule_of: RuleOf) -> None:
+        """Drop from each choice the grids that are unlikely to be chosen, by the folds
+        within `reach` of its own; see `Rule.dropped`.
+
+        Args:
+            reach: places in the circle of folds.
+            rule_of: gives the rule of the choice among some candidates.
+        """
+        count = len(fold_numbers(self.folds))
+        for task, running in self.running.items():
+            rule = rule_of(self.choices[task])
+            grids = self.grids[task]
+            by_choice = [*self.right[task], self._alone(task)]
+            for choice, right in enumerate(by_choice):
+                near = np.isin(self.folds, folds_near(choice, reach, count))
+                near &= self.tested[task]
+                places = np.flatnonzero(running[choice])
+                if near.any() and places.size:
+                    among = replace(rule, allowed=places)
+                    dropped = among.dropped(right[:, near], grids)
+                    running[choice] &= ~np.isin(grids, dropped)
 
     def _alone(self, task: str) -> NDArray[Any]:
         """(candidates, n) answers to each trial by the fits of this table without its
@@ -265,22 +183,37 @@ class AnswerTable:
     def plain(self, task: str) -> Floats:
         """(candidates, n) share of right answers to each trial, by the fits without its
         fold in this table and in the `repeated` ones."""
-        shares = self._alone(task).astype(np.float64)
+        shares = self._alone(task).astype(np.float64) * self._running(task)[-1]
         for table in self.repeated:
             shares += table.plain(task)
-        return shares / (1 + len(self.repeated))
+        return np.asarray(shares / (1 + len(self.repeated)))
 
     def nested(self, task: str, fold: int) -> NDArray[Any]:
         """(candidates, others) answers to the trials outside a fold, by the fits
         without the fold and without the trial's own."""
-        return np.asarray(self.right[task][fold][:, self.folds != fold])
+        right = self.right[task][fold][:, self.folds != fold]
+        return np.asarray(right * self._running(task)[fold])
+
+    def is_running(self, task: str, candidate: int) -> bool:
+        """Whether a candidate was not dropped, from the choice by all trials nor from
+        every other."""
+        running = self._running(task)[:, candidate, 0]
+        return bool(running[-1] and running[:-1].any())
+
+    def _running(self, task: str) -> Booleans:
+        """(folds + 1, candidates, 1) `running`."""
+        all_run = np.ones((len(self.right[task]) + 1, len(self.choices[task])), bool)
+        return np.asarray(self.running.get(task, all_run)[:, :, None])
 
     def answered(self, task: str, candidates: Sequence[int]) -> Result:
         """The accuracy where the candidate `candidates` for a fold answers the trials of
-        that fold."""
+        that fold, without the folds where it was dropped."""
         trials = np.arange(len(self.folds))
-        hits = self._alone(task)[np.array(candidates)[self.folds], trials]
-        hits = hits[self.tested.get(task, self.folds >= 0)]
+        places = np.array(candidates)[self.folds]
+        hits = self._alone(task)[places, trials]
+        tested = self.tested.get(task, self.folds >= 0)
+        tested = tested & self._running(task)[self.folds, places, 0]
+        hits = hits[tested]
         usual = self.choices[task][int(np.bincount(candidates).argmax())]
         return Result(int(hits.sum()), len(hits), usual.components, usual.k, hits=hits)
 
@@ -316,32 +249,14 @@ def nested_accuracy(
     return table.answered(task, chosen_by_fold(table, task, rule))
 
 
-def averaged(tables: Sequence[AnswerTable]) -> AnswerTable:
-    """A table with the mean share of right answers of several, of the same candidates
-    and folds."""
-    first = tables[0]
-    right = {}
-    for task in first.right:
-        right[task] = np.mean([table.right[task] for table in tables], axis=0)
-    return replace(first, right=right)
-
-
 def fold_numbers(folds: Integers) -> range:
     """The numbers of the folds (n,), from 0."""
     return range(int(folds.max()) + 1)
 
 
-def _pairs(folds: Integers, nested: bool) -> list[tuple[int, int]]:
-    """The folds that the fits leave out: each alone, and each two where `nested`."""
-    numbers = fold_numbers(folds)
-    if nested:
-        return list(combinations_with_replacement(numbers, 2))
-    return list(zip(numbers, numbers, strict=True))
-
-
 def fits(folds: Integers, nested: bool) -> int:
     """How many fits `evaluate` makes."""
-    return len(_pairs(folds, nested))
+    return len(fold_pairs(len(fold_numbers(folds)), nested))
 
 
 def evaluate(
@@ -352,6 +267,7 @@ def evaluate(
     jobs: int = 1,
     progress: Callable[[], object] | None = None,
     nested: bool = True,
+    halve: RuleOf | None = None,
 ) -> AnswerTable:
     """Fit every candidate without each fold, and without each two folds.
 
@@ -363,6 +279,8 @@ def evaluate(
         progress: called after each of the `fits`.
         nested: False makes the fits without each fold only, a fifth of the work. Of the
             table, `AnswerTable.plain` alone is then valid.
+        halve: gives the rule by which candidates are dropped after the first folds;
+            None drops none.
 
     Raises:
         InputError: there are fewer than three folds, or the vectors are not finite.
@@ -374,24 +292,64 @@ def evaluate(
         )
     vectors = replace(vectors, X=finite(vectors.X))
     classes = {task: _classes(labels) for task, labels in vectors.y.items()}
-    choices = {task: _choices(task, grids, classes) for task in classes}
+    table = _empty(folds, grids, classes)
+    steps = rungs(count, nested) if halve else [(count, fold_pairs(count, nested))]
+    for step, (reach, pairs) in enumerate(steps, 1):
+        work = (
+            delayed(answers_without)(
+                vectors, classes, np.isin(folds, pair), _fitted(table, pair, grids)
+            )
+            for pair in pairs
+        )
+        results = Parallel(n_jobs=jobs, return_as="generator")(work)
+        for pair, answers in zip(pairs, results, strict=True):
+            if progress is not None:
+                progress()
+            table.enter(pair, answers)
+        if halve is not None and step < len(steps):
+            table.drop(reach, halve)
+    return table
+
+
+def _empty(
+    folds: Integers,
+    grids: Sequence[SearchGrid],
+    classes: Mapping[str, Integers],
+) -> AnswerTable:
+    """A table of the tasks that some grid is for, in which every candidate runs."""
+    count = len(fold_numbers(folds))
+    choices = {}
+    numbers = {}
     right = {}
+    running = {}
     tested = {}
     for task, labels in classes.items():
-        tested[task] = (labels >= 0) & (folds >= 0)
-        right[task] = np.tile(~tested[task], (count, len(choices[task]), 1))
-    table = AnswerTable(folds, choices, right, tested)
-    pairs = _pairs(folds, nested)
-    work = (
-        delayed(_answers)(vectors, classes, np.isin(folds, pair), grids)
-        for pair in pairs
-    )
-    results = Parallel(n_jobs=jobs, return_as="generator")(work)
-    for pair, answers in zip(pairs, results, strict=True):
-        if progress is not None:
-            progress()
-        table.enter(pair, answers)
-    return table
+        by_grid = [_choices(task, grid, classes) for grid in grids]
+        sizes = [len(of_grid) for of_grid in by_grid]
+        if sum(sizes):
+            choices[task] = [choice for of_grid in by_grid for choice in of_grid]
+            numbers[task] = np.repeat(np.arange(len(grids)), sizes)
+            running[task] = np.ones((count + 1, sum(sizes)), dtype=bool)
+            tested[task] = (labels >= 0) & (folds >= 0)
+            right[task] = np.tile(~tested[task], (count, sum(sizes), 1))
+    return AnswerTable(folds, choices, right, tested, (), numbers, running)
+
+
+def _fitted(
+    table: AnswerTable,
+    pair: Pair,
+    grids: Sequence[SearchGrid],
+) -> list[SearchGrid]:
+    """The grids that a fit is made for, each for the tasks in which it runs."""
+    tasks_of: list[list[str]] = [[] for _ in grids]
+    for task, numbers in table.grids.items():
+        for number in np.unique(numbers[table.fitted(pair, task)]):
+            tasks_of[number].append(task)
+    return [
+        replace(grid, tasks=tuple(tasks))
+        for grid, tasks in zip(grids, tasks_of, strict=True)
+        if tasks
+    ]
 
 
 def _classes(labels: Strings) -> Integers:
@@ -402,14 +360,12 @@ def _classes(labels: Strings) -> Integers:
 
 def _choices(
     task: str,
-    grids: Sequence[SearchGrid],
+    grid: SearchGrid,
     classes: Mapping[str, Integers],
 ) -> list[Choice]:
-    """The candidates of a task."""
-    choices: list[Choice] = []
-    for grid in grids:
-        if grid.is_for(task):
-            targets = grid.targets or (task,)
-            directions = sum(int(classes[target].max()) for target in targets)
-            choices += grid.choices(max(directions, 1))
-    return choices
+    """A grid's candidates for a task."""
+    if not grid.is_for(task):
+        return []
+    targets = grid.targets or (task,)
+    directions = sum(int(classes[target].max()) for target in targets)
+    return grid.choices(max(directions, 1))

@@ -51,7 +51,7 @@ class SearchGrid:
         return not self.tasks or task in self.tasks
 
     def choices(self, directions: int) -> list[Choice]:
-        """Every candidate, in the order of `_answers`.
+        """Every candidate, in the order of `train.choose.answers`.
 
         Args:
             directions: how many discriminants there are at most.

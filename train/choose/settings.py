@@ -26,8 +26,8 @@ class Chosen:
         by_trial: the same with single trials left out.
         left_out: `trial`, or the label whose groups were left out.
         candidates: nested accuracy of each candidate's own choice of numbers, by the
-            task alone.
-        picks: the best settings of each candidate.
+            task alone; None where it was dropped, or is none for the task.
+        picks: the best settings of each candidate, likewise.
         folds: (n,) of `accuracy`.
         by_fold: [fold]{task: the choice without the fold's trials}, whose decisions
             `accuracy` counts: those of the task and of the tasks that are decided
@@ -38,8 +38,8 @@ class Chosen:
     accuracy: Promise
     by_trial: Promise
     left_out: str
-    candidates: tuple[Promise, ...] = ()
-    picks: tuple[Choice, ...] = ()
+    candidates: tuple[Promise | None, ...] = ()
+    picks: tuple[Choice | None, ...] = ()
     folds: Integers = field(default_factory=lambda: np.zeros(0, np.int64), repr=False)
     by_fold: tuple[dict[str, Choice], ...] = ()
 

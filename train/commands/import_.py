@@ -23,6 +23,7 @@ from edge.recording import Recording
 from edge.saving import save
 from edge.tools.trial_options import add_arm, open_arm
 from edge.touch.arm import Chain
+from edge.writing import remove_leftovers
 from train import former_recordings
 from train.data.thresholds import count_felt, proposed
 from train.importers import Refused, Trial, names
@@ -70,6 +71,7 @@ def run(arguments: argparse.Namespace) -> int:
         raise InputError(f"{arguments.file}: no such file or folder")
     if arguments.file.name in ("", ".."):  # a bag is a folder, perhaps the current one
         arguments.file = arguments.file.resolve()
+    remove_leftovers(arguments.out)
     importer = arguments.importer
     options = (arguments,) if hasattr(importer, "add_options") else ()
     first = FirstOfEachKind()

@@ -56,7 +56,11 @@ def remarks(scene: "Scene", written: "Written") -> Iterator[str]:
     """What a user should know of recordings that were written."""
     yield from former_recordings.warnings(written.paths[0].parent, written.paths)
     if written.redrawn:
-        yield f"drawn again until they fitted their labels: {written.redrawn}"
+        reasons = (f"{count} {reason}" for reason, count in written.redrawn.items())
+        yield (
+            "drawn again until they fitted their labels within "
+            f"{scene.labels['window_s']:g} s of the touch: {', '.join(reasons)}"
+        )
     if written.unfelt:
         yield (
             f"in {written.unfelt} of them no taxel rises above skin.onset_counts "

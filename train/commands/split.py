@@ -16,6 +16,7 @@ from edge.recording import Recording
 from edge.saving import save
 from edge.touch.contact import Contact
 from edge.touch.track import ContactTracker
+from edge.writing import remove_leftovers
 from train import former_recordings
 from train.data.dataset import read
 from train.data.labels import labels_of
@@ -51,6 +52,7 @@ def run(arguments: argparse.Namespace) -> int:
                         f"{file} is that of another recording too; rename one of them"
                     )
                 contacts[file] = contact
+    remove_leftovers(arguments.out)
     for path, contact in contacts.items():
         save(path, contact)
     print(f"recordings written to {arguments.out}: {len(contacts)}")

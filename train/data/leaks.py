@@ -9,7 +9,9 @@ from pathlib import Path
 import numpy as np
 from scipy.spatial.distance import cdist
 
+from train.data.contacts import Trial
 from train.data.dataset import DataSet, Recordings
+from train.data.thresholds import proposed
 from train.data.vectors import Labels
 
 LEAK = 0.5
@@ -38,17 +40,30 @@ def copies(recordings: Recordings) -> list[str]:
     ]
 
 
+def is_late(trial: Trial) -> bool:
+    """Whether a touch was under way in the first frame."""
+    return bool(trial.onset_s <= trial.recording.t[0])
+
+
+def late_share(dataset: DataSet) -> float:
+    """Share of the touches that were under way in their first frame."""
+    return float(np.mean([is_late(trial) for trial in dataset.trials]))
+
+
 def leaks(dataset: DataSet, y: Labels) -> list[str]:
     """Warnings where the first frame gives labels away, or most recordings begin in
     contact."""
     recordings = [t.recording for t in dataset.trials]
-    untouched = np.array([t.onset_s > t.recording.t[0] for t in dataset.trials])
-    if 2 * untouched.sum() < len(untouched):
+    share = late_share(dataset)
+    if share > 0.5:
+        advice = "record from before the touch"
+        if proposed(recordings).onset > dataset.layout.onset:
+            advice += ", or take higher thresholds (`python -m train thresholds`)"
         return [
-            f"warning: {(~untouched).mean():.0%} of the touches begin with their "
-            "recording, so their onset is not known; record from before the touch, or "
-            "take higher thresholds (`python -m train thresholds`)"
+            f"warning: {share:.0%} of the touches begin with their "
+            f"recording, so their onset is not known; {advice}"
         ]
+    untouched = np.array([not is_late(trial) for trial in dataset.trials])
     X = np.stack([recording.frames[0].reshape(-1) for recording in recordings])
     squares = cdist(X[untouched], X[untouched], "sqeuclidean")
     np.fill_diagonal(squares, np.inf)

@@ -10,13 +10,14 @@ from pathlib import Path
 import numpy as np
 
 from edge.arrays import Floats
-from edge.touch.doubts import LIMIT_TOLERANCE
+from edge.touch.joint_doubts import LIMIT_TOLERANCE
 from train.data.dataset import DataSet
 
 MOST_DEVIATIONS = 20.0
 """No trial of the simulated and recorded sets that we know lies so far outside."""
-ROUNDING = 1e-12
-"""A spread of a smaller share of the values is rounding."""
+NEARLY_EQUAL = 0.02
+"""A feature is nearly constant where the values of half of the trials are within this
+share of the usual one. Any touch that differs then lies far outside."""
 UNLIMITED = (-np.inf, np.inf)
 LEAVE_OUT = "leave the recording out if it is wrong"
 FEWEST_TRIALS = 10
@@ -25,17 +26,22 @@ FEWEST_TRIALS = 10
 
 def deviations(values: Floats) -> Floats:
     """(n,) the largest distance of each row of values (n, p) to the mean of the other
-    rows, in the others' standard deviation over all columns; 0 where the others are all
-    equal."""
+    rows, in the others' standard deviation over all columns."""
     rest = len(values) - 1
     middle = np.median(values, axis=0)
     centred = values - middle
     squares = np.square(centred)
     means = _sum_of_others(centred) / rest
     variance = _sum_of_others(squares) / rest - np.square(means)
-    spread = variance.mean(axis=1)
-    spread = np.where(spread > np.square(ROUNDING * middle).mean(), spread, np.inf)
-    return np.asarray(np.abs(centred - means).max(axis=1) / np.sqrt(spread))
+    spread = np.sqrt(variance.mean(axis=1))
+    return np.asarray(np.abs(centred - means).max(axis=1) / spread)
+
+
+def nearly_constant(values: Floats) -> bool:
+    """Whether half of the trials' values (n, p) hardly differ from those of others."""
+    usual = np.median(values, axis=0)
+    spread = np.median(np.abs(values - usual))
+    return bool(spread <= NEARLY_EQUAL * np.abs(usual).mean())
 
 
 def _sum_of_others(x: Floats) -> Floats:
@@ -48,7 +54,8 @@ def _sum_of_others(x: Floats) -> Floats:
 
 
 def by_features(dataset: DataSet, X: Floats, widths: Sequence[int]) -> Iterator[str]:
-    """A sentence on each trial that a feature puts far outside.
+    """A sentence on each trial that a feature puts far outside, unless the feature is
+    nearly constant.
 
     Args:
         dataset: the trials.
@@ -61,6 +68,8 @@ def by_features(dataset: DataSet, X: Floats, widths: Sequence[int]) -> Iterator[
     names = [""] * len(X)
     blocks = np.split(X, np.cumsum(widths)[:-1], axis=1)
     for name, block in zip(dataset.names, blocks, strict=True):
+        if nearly_constant(block):
+            continue
         distances = deviations(block)
         for trial in np.flatnonzero(distances > farthest):
             names[trial] = name

@@ -14,9 +14,13 @@ from numpy.typing import NDArray
 
 from edge.commands.output import counted
 from edge.errors import InputError
+from train.progress import say
 
 JITTER_STEPS = 0.5
 """A time may go back by so many of the usual steps."""
+AHEAD_S = 60.0
+AHEAD_JITTERS = 200.0
+"""A time that jumps by more, and by more than so many jitters, is a wrong one."""
 MOST_REPEATED = 0.01
 """Share of the frames that may have the time of the frame before."""
 GAP_STEPS = 5.0
@@ -65,11 +69,14 @@ def order(
     steps = np.diff(t)
     forward = steps[steps > 0.0]
     jitter_s = JITTER_STEPS * float(np.median(forward)) if len(forward) else 0.0
-    back = np.flatnonzero(steps < -jitter_s)
-    if len(back):
+    far_s = max(AHEAD_S, AHEAD_JITTERS * jitter_s)
+    wrong = np.flatnonzero((steps < -jitter_s) | (steps > far_s))
+    if len(wrong):
+        step_s = steps[wrong[0]]
+        goes = "goes back" if step_s < 0.0 else "jumps"
         raise InputError(
-            f"{where}: its time goes back by {-steps[back[0]]:g} s at {frame} "
-            f"{numbers[back[0] + 1]}; split it there, or fix the times"
+            f"{where}: its time {goes} by {abs(step_s):g} s at {frame} "
+            f"{numbers[wrong[0] + 1]}; split it there, or fix the times"
         )
     frames = np.argsort(t, kind="stable")
     last = np.append(np.diff(t[frames]) > 0.0, True)
@@ -124,3 +131,24 @@ def angles_at(
     unknown = (across_s > gap_s * (1.0 + 1e-9)) | (outside_s > HOLD_S * (1.0 + 1e-9))
     at_frames[unknown] = np.nan
     return at_frames
+
+
+def complete(angles: NDArray[np.float64], where: str) -> NDArray[np.float64]:
+    """Joint angles (n, dof) that are NaN in each frame that lacks one; says how many do.
+
+    Raises:
+        InputError: all frames lack one.
+    """
+    unknown = ~np.isfinite(angles).all(axis=1)
+    angles[unknown] = np.nan
+    if unknown.all():
+        raise InputError(
+            f"{where} has no joint angle at the time of any frame; record both with one "
+            "clock"
+        )
+    if unknown.any():
+        say(
+            f"{where} lacks joint angles for {int(unknown.sum())} of {len(angles)} "
+            "frames, where they are unknown"
+        )
+    return angles

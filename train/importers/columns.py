@@ -151,7 +151,8 @@ def meaning(table: Table, options: TableOptions) -> Meaning:
         raise InputError(
             f"{table.where}: column {name} is named both as a taxel and as time or joint"
         )
-    left_out = [name for name in rest if name not in taxels]
+    felt = set(taxels)
+    left_out = [name for name in rest if name not in felt]
     unit, source = _unit(table, time, options)
     is_told = any((table.named, table.shape, table.file_names, options.taxels))
     shape = table.shape or shape
@@ -254,8 +255,11 @@ def _grids(*names: str) -> list[tuple[list[str], tuple[int, ...]]]:
         shape = group.max() - low + 1
         is_grid = len(group) == len(group.drop_duplicates()) == shape.prod()
         if is_grid and low["first"] <= 1:
-            ordered = group.sort_values(["first", "second"]).index
-            grids.append((list(ordered), () if flat else tuple(shape.tolist())))
+            ordered = list(group.sort_values(["first", "second"]).index)
+            # pandas names the columns of one name s, s.1, s.2.
+            stem = ordered[0].removesuffix(".1")
+            first = [stem] if stem in names and stem != ordered[0] else []
+            grids.append((first + ordered, () if flat else tuple(shape.tolist())))
     return grids
 
 

@@ -24,6 +24,8 @@ START = 3
 """Frames at the start of a trial, whose median may be the rest value."""
 MOST_COUNTS = 65535
 MOST_SHEAR = 32767
+CODES = (65535.0, 4095.0, -1.0, -999.0)
+"""Numbers that some loggers write for a missing value."""
 DECIMALS = 6
 """Most decimals that signed values keep."""
 PART = 1 << 16
@@ -200,12 +202,7 @@ def rest_of(trials: Sequence[Samples], options: ValueOptions) -> Rest:
     """
     if options.falls and options.signed:
         raise InputError("--falls and --signed exclude each other; give one")
-    missing = sum(int(trial.missing.sum()) for trial in trials)
-    if missing:
-        say(
-            f"missing: {counted(missing, 'value')}, where a taxel is not valid in its "
-            "frame"
-        )
+    _say_missing(trials, options.missing)
     if not (options.falls or options.signed):
         return Rest(scale=options.scale)
     values = _quietest(trials, options)
@@ -215,6 +212,31 @@ def rest_of(trials: Sequence[Samples], options: ValueOptions) -> Rest:
         return Rest(values, falls=True, scale=options.scale)
     scale = _finest(deviations) if options.scale == 1.0 else options.scale
     return Rest(values, scale=scale)
+
+
+def _say_missing(trials: Sequence[Samples], code: float | None) -> None:
+    """Take away the values that stand for missing ones, and say how many are missing,
+    and which others stand alone as such values do."""
+    missing = 0
+    for trial in trials:
+        trial.values[trial.values == code] = math.nan
+        missing += int(trial.missing.sum())
+    if missing:
+        say(
+            f"missing: {counted(missing, 'value')}, where a taxel is not valid in its "
+            "frame"
+        )
+    values = np.concatenate([trial.values.ravel() for trial in trials])
+    for code in CODES:
+        others = values[np.isfinite(values) & (values != code)]
+        count = int((values == code).sum())
+        if not count or not others.size:
+            continue
+        if code < 0.0 <= others.min() or code - others.max() > np.ptp(others):
+            say(
+                f"{counted(count, 'value')} of {code:g} stand alone; if they are missing, "
+                f"give --missing {code:g}"
+            )
 
 
 def _say_lost(deviations: Sequence[NDArray[np.float64]]) -> None:
@@ -270,7 +292,7 @@ def _check_counts(where: str, counts: NDArray[np.float64], exact: bool) -> None:
     high = normal.max()
     is_whole = not exact or np.array_equal(normal, np.rint(normal))
     if low < 0.0 or high > MOST_COUNTS + 0.5 or not is_whole:
-        hint = "--signed, " if low < 0.0 else ""
+        hint = "--missing, --signed, " if low < 0.0 else ""
         raise InputError(
             f"{where}: {low:g} to {high:g} are no counts (whole numbers from 0 to "
             f"65535); see {hint}--falls, --scale and --taxels"

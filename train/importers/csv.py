@@ -24,11 +24,14 @@ from statistics import mode
 from typing import Any
 
 import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
 
 from edge.config import ConfigTable, short_text
 from edge.errors import InputError
 from edge.touch.arm import Chain
-from train.importers import Refused, Trial
+from edge.touch.layout import RELEASE_S
+from train.importers import Refused, Trial, clock
 from train.importers.axes import parted
 from train.importers.columns import Meaning, meaning, times_of
 from train.importers.counts import Samples, rest_of, skin_shape
@@ -200,15 +203,15 @@ def _understood(source: Source, options: TableOptions) -> Measured:
     table = source.table if axes is None else parted(source.table, axes.normal)
     sense = meaning(table, options)
     values = table.values(sense.taxels)
-    joints = None
-    if sense.joints:
-        unit = np.pi / 180.0 if options.degrees else 1.0
-        joints = unit * table.numbers(sense.joints)
     t = times_of(table, sense, options)
-    samples = replace(Samples.of(table.where, t, values, axes), joints=joints)
+    samples = Samples.of(table.where, t, values, axes)
     if np.isnan(samples.values[..., 0]).all():
         raise InputError(f"{table.where}: none of its values is a finite number")
     rows = table.data.index
+    if sense.joints:
+        unit = np.pi / 180.0 if options.degrees else 1.0
+        angles = unit * table.numbers(sense.joints)
+        samples, rows = _with_joints(samples, rows, angles)
     # Without the table, which would fill the memory a second time where it is long.
     return Measured(
         source.name,
@@ -218,3 +221,22 @@ def _understood(source: Source, options: TableOptions) -> Measured:
         sense,
         samples.in_order(str(rows.name), rows),
     )
+
+
+def _with_joints(
+    samples: Samples, rows: pd.Index, angles: NDArray[np.float64]
+) -> tuple[Samples, pd.Index]:
+    """The frames and their rows, with joint angles that may stand in rows of their
+    own."""
+    where = samples.where
+    known = np.isfinite(angles).all(axis=1)
+    if known.all() or not known.any():
+        return replace(samples, joints=clock.complete(angles, where)), rows
+    felt = np.isfinite(samples.values).any(axis=(1, 2))
+    order = clock.order(samples.t[known], where, str(rows.name), rows[known]).kept
+    joints_t = samples.t[known][order]
+    at_frames = clock.angles_at(
+        samples.t[felt], joints_t, angles[known][order], RELEASE_S
+    )
+    frames = Samples(where, samples.t[felt], samples.values[felt])
+    return replace(frames, joints=clock.complete(at_frames, where)), rows[felt]

@@ -79,6 +79,7 @@ def add_value_options(parser: argparse.ArgumentParser) -> None:
         default=1.0,
         help="counts in a unit of values with fractions",
     )
+    add("--missing", type=float, metavar="VALUE", help="stands for a missing value")
     add(
         "--axes",
         type=axis_letters,
@@ -137,6 +138,7 @@ class ValueOptions:
     falls: bool = False
     signed: bool = False
     scale: float = 1.0
+    missing: float | None = None
     axes: Axes | None = None
 
     @classmethod

@@ -326,16 +326,15 @@ def _header(text: _Text) -> _Header:
 
 
 def _stated(text: _Text) -> _Header:
-    """The names as they stand."""
+    """The names as they stand; a row of numbers and empty cells has none."""
     cells = _names(text.rows[0])
-    if not all(map(_is_number, cells)):
-        return _Header(cells, True, 1)
+    numbers = [_is_number(cell) for cell in cells if cell]
     above = [text.comment.lstrip("#% ")]
     _, heading = next(_rows(above, text.mark))
     heading = _names(heading)
-    if len(heading) == len(cells) and not _is_number(heading[0]):
+    if any(numbers) and len(heading) == len(cells) and not _is_number(heading[0]):
         return _Header(heading, True, 0)
-    return _without_names(text)
+    return _without_names(text) if all(numbers) else _Header(cells, True, 1)
 
 
 def _is_number(text: str) -> bool:
@@ -355,13 +354,14 @@ def _parsed(text: _Text, header: _Header) -> pd.DataFrame:
         # Columns that hold texts in a part of a long table are read anew below.
         warnings.simplefilter("ignore", pd.errors.DtypeWarning)
         table = _cells(text, header, decimal=text.decimal)
+    dtypes = list(table.dtypes)
     altered = []
     for i, name in enumerate(header.names):
-        is_number = pd.api.types.is_numeric_dtype(table[i])
+        if name != "trial" and pd.api.types.is_numeric_dtype(dtypes[i]):
+            continue
         # A word such as `NA` is no string any more, nor is a number beyond measure.
         is_text = pd.api.types.infer_dtype(table[i]) == "string"
-        stands = is_text and not table[i].hasnans
-        if not stands and (name == "trial" or not is_number):
+        if not is_text or table[i].hasnans:
             altered.append(i)
     if altered:
         table[altered] = _texts(text, header, altered)
@@ -394,8 +394,13 @@ def _cells(text: _Text, header: _Header, **options: Any) -> pd.DataFrame:
 def _named(table: pd.DataFrame, header: _Header) -> pd.DataFrame:
     """The columns by their names, without those that have neither a name nor a
     value."""
-    filled = [i for i in table if header.names[i] or table[i].notna().any()]
-    return table[filled].set_axis([header.unique[i] for i in filled], axis=1)
+    # Without a header, a sign at the ends of the rows makes an empty column.
+    last = len(header.names) - (not header.named)
+    filled = [
+        i for i in table if (header.names[i] and i < last) or table[i].notna().any()
+    ]
+    unique = header.unique
+    return table[filled].set_axis([unique[i] for i in filled], axis=1)
 
 
 def _unpacked(suffix: str, data: bytes) -> bytes:

@@ -255,20 +255,7 @@ class Log:
             places = clock.order(joint_t, where, "message").kept
             radians = joint[["angle"]].to_numpy()[places]
             columns.append(clock.angles_at(t, joint_t[places], radians, release_s))
-        at_frames = np.hstack(columns)
-        unknown = ~np.isfinite(at_frames).all(axis=1)
-        at_frames[unknown] = np.nan
-        if unknown.all():
-            raise InputError(
-                f"{where} has no joint angle at the time of any frame; record both with "
-                "one clock"
-            )
-        if unknown.any():
-            say(
-                f"{where} lacks joint angles for {int(unknown.sum())} of {len(t)} "
-                "frames, where they are unknown"
-            )
-        return at_frames
+        return clock.complete(np.hstack(columns), where)
 
     def _joint_names(self, where: str, logged: list[str | int]) -> list[str | int]:
         """The joints whose angles are taken, in their order."""

@@ -36,8 +36,7 @@ def _determines(a: Strings, b: Strings) -> bool:
 
 
 def factors_of(y: Labels) -> dict[str, dict[str, tuple[int, ...]]]:
-    """{product: its `edge.model.agreement.Factors`}, where every pair of labels was
-    met.
+    """{product: its `edge.model.agreement.Factors`}.
 
     No task belongs to two products.
     """
@@ -48,10 +47,11 @@ def factors_of(y: Labels) -> dict[str, dict[str, tuple[int, ...]]]:
         rows = set(zip(*(y[t].tolist() for t in tasks), strict=True))
         pairs = sorted(filter(all, rows))
         names = [sorted({*y[factor].tolist()} - {""}) for factor in factors]
-        complete = 0 < len(pairs) == len(names[0]) * len(names[1])
-        if complete and used_tasks.isdisjoint(tasks):
+        columns = [[pair[i] for pair in pairs] for i in (1, 2)]
+        # A factor's label may be that of trials without a label of the product.
+        paired = [sorted({*column}) for column in columns] == names
+        if paired and used_tasks.isdisjoint(tasks):
             used_tasks.update(tasks)
-            _, *columns = zip(*pairs, strict=True)
             products_of[task] = {}
             for factor, labels, column in zip(factors, names, columns, strict=True):
                 products_of[task][factor] = tuple(map(labels.index, column))

@@ -7,7 +7,7 @@ machines, 1999).
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import astuple, dataclass, replace
 
 import numpy as np
 from scipy.optimize import brentq
@@ -68,14 +68,18 @@ class Curve:
         margins: Floats,
         excess: Floats,
         share: float,
+        known: Floats | float = 1.0,
     ) -> Curve:
-        """The curve with the intercept at which the mean probability is `share`."""
+        """The curve with the intercept at which the mean probability is `share`, each
+        times that of `known`."""
         half_a_trial = 0.5 / margins.size
-        target = min(max(share, half_a_trial), 1.0 - half_a_trial)
+        most = float(np.mean(known)) - half_a_trial
+        target = min(max(share, half_a_trial), most)
 
         def surplus(shift: float) -> float:
             shifted = replace(self, intercept=self.intercept + shift)
-            return float(shifted.probabilities(margins, excess).mean()) - target
+            probabilities = shifted.probabilities(margins, excess) * known
+            return float(probabilities.mean()) - target
 
         reach = 50.0 + abs(self.slope) * float(np.abs(margins).max(initial=0.0))
         shift = float(brentq(surplus, -reach, reach))
@@ -85,6 +89,37 @@ class Curve:
         """That labels with these margins are right, in the shape of the margins."""
         logits = self.slope * margins + self.intercept - self.doubt * excess
         return np.asarray(expit(logits))
+
+
+@dataclass(frozen=True)
+class Evidence:
+    """What answers to left-out trials say of how sure a model may be; arrays of one
+    shape.
+
+    Attributes:
+        margins: of the labels.
+        excess: of the contacts' novelty.
+        right: whether the labels are right.
+        honest: whether those are right whose settings were chosen without the trials.
+        known: probability that the thing is one of those in training, by which that of
+            the curve is multiplied.
+    """
+
+    margins: Floats
+    excess: Floats
+    right: Booleans
+    honest: Booleans
+    known: Floats
+
+    def curve(self) -> Curve:
+        """The curve of the answers, with the mean probability of honest ones."""
+        curve = Curve.of(self.margins, self.excess, self.right)
+        share = float(self.honest.mean())
+        return curve.with_mean(self.margins, self.excess, share, self.known)
+
+    def at(self, point: int) -> Evidence:
+        """The evidence at one decision point."""
+        return Evidence(*(values[point] for values in astuple(self)))
 
 
 def _logistic(

@@ -1,12 +1,18 @@
 """How unlike all training trials a contact is, whatever the tasks' own projections are.
 
-Discriminants are chosen to ignore what does not tell labels apart, so they cannot see
-what is new. Novelty is therefore scored in a space of its own, in which the choice of
-settings has no part: each column of the features is centred, divided by its standard
-deviation and cut off, and projected to principal components, which all decision points
-share. The score is the product of two lengths: of what lies outside the components, and
-of the distance to the nearest training trial, in units of the spread within a label
-(Mahalanobis).
+Doubt has a space of its own, in which the choice of settings has no part: each column
+of the features is centred, divided by its standard deviation and cut off, and projected
+to principal components, which all decision points share. They are whitened by the
+spread within a label (Mahalanobis).
+
+Two scores are taken there. **Novelty** sees a changed body: it is the product of two
+lengths, of what lies outside the components, and of the distance to the nearest
+training trial. **Remoteness** sees a thing that was never met: it is the distance to
+the nearest training trial where directions that tell no labels apart count a quarter,
+over the distance at which that trial and its label have their own neighbours (as the
+local outlier factor of Breunig, Kriegel, Ng and Sander, 2000). The whitened axes are
+turned so that the discriminants of the labels come first (Fisher's, as the spread
+within labels is the same in all directions).
 
 The fits of the folds make the same number of components of their own trials. So the
 scores of their held-out trials tell how high those of new contacts with trained objects
@@ -21,6 +27,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 from joblib import Parallel, delayed
@@ -28,11 +35,14 @@ from scipy.linalg import eigh
 from scipy.spatial.distance import cdist
 
 from edge.arrays import Booleans, Floats, Integers
-from edge.model.info import Novelty
 from train.data.vectors import Strings
 from train.threads import single_thread
 
-NOVELTY_RATES = (0.5, 0.3, 0.2, 0.15, 0.1, 0.07, 0.05, 0.03, 0.02, 0.01)
+UNUSUAL_RATE = 0.02
+UNKNOWN_RATE = 0.01
+"""Shares of contacts with trained things that may be flagged."""
+BESIDE = 0.25
+"""Weight of directions that tell no labels apart, a power of two."""
 TAIL = 0.1
 FOLDS = 20
 """Folds of the held-out scores: more than a choice has, as a space of fewer trials finds
@@ -66,7 +76,10 @@ class NoveltyPoint:
             products divided by 2^`shift`.
         shift: power of two.
         rows: (n, components) whole coordinates of the training trials.
-        unit: of the scores, a power of two.
+        weights: (components,) of coordinates in remoteness: 1 for discriminants, and
+            `BESIDE`.
+        nearness: (n,) by which squared distances to the rows are multiplied.
+        unit: of the novelty, a power of two.
     """
 
     mean: Floats
@@ -74,7 +87,24 @@ class NoveltyPoint:
     whitening: Floats
     shift: int
     rows: Floats
+    weights: Floats
+    nearness: Floats
     unit: float
+
+
+class Scores(NamedTuple):
+    """How unlike all training trials vectors are.
+
+    Attributes:
+        novelty, remoteness: (decision points, m).
+    """
+
+    novelty: Floats
+    remoteness: Floats
+
+    def part(self, trials: Booleans) -> Scores:
+        """Those of some vectors, by a mask (m,)."""
+        return Scores(*(score[:, trials] for score in self))
 
 
 @dataclass(frozen=True)
@@ -115,10 +145,10 @@ class NoveltySpace:
             points.append(_point(*scale, z, labels))
         return cls(weights, shift, tuple(points))
 
-    def scores(self, X: Floats) -> Floats:
-        """(decision points, m) how unlike all training trials vectors (decision points,
-        m, p) are."""
-        return np.stack(list(map(self._scores, self.points, X)))
+    def scores(self, X: Floats) -> Scores:
+        """The scores of vectors (decision points, m, p)."""
+        pairs = map(self._scores, self.points, X)
+        return Scores(*map(np.stack, zip(*pairs, strict=True)))
 
     def coordinates(self, point: int, x: Floats) -> Floats:
         """(m, components) whole coordinates of vectors (m, p) at a decision point."""
@@ -126,13 +156,15 @@ class NoveltySpace:
         steps = _steps(x, constants.mean, constants.gain)
         return _coordinates(_product(steps, self.weights, self.shift), constants)
 
-    def _scores(self, point: NoveltyPoint, x: Floats) -> Floats:
+    def _scores(self, point: NoveltyPoint, x: Floats) -> tuple[Floats, Floats]:
         steps = _steps(x, point.mean, point.gain)
         z = _product(steps, self.weights, self.shift)
         outside = np.maximum((steps**2).sum(axis=1) - (z**2).sum(axis=1), 1.0)
-        squares = cdist(_coordinates(z, point), point.rows, "sqeuclidean")
-        nearest = np.sqrt(squares.min(axis=1))
-        return np.asarray(np.sqrt(outside) * nearest * point.unit)
+        y = _coordinates(z, point)
+        nearest = np.sqrt(cdist(y, point.rows, "sqeuclidean").min(axis=1))
+        weighted = y * point.weights, point.rows * point.weights
+        squares = cdist(*weighted, "sqeuclidean") * point.nearness
+        return np.sqrt(outside) * nearest * point.unit, np.sqrt(squares.min(axis=1))
 
 
 def _scale(x: Floats, widths: Sequence[int]) -> tuple[Floats, Floats]:
@@ -208,12 +240,44 @@ def _point(mean: Floats, gain: Floats, z: Floats, labels: Strings) -> NoveltyPoi
     covariance += SHRINKAGE * variance * np.eye(components)
     values, axes = np.linalg.eigh(covariance)
     whitening = axes / np.sqrt(values)
+    whitening, directions = _turned(whitening, z, labels)
+    weights = np.where(np.arange(components) < directions, 1.0, BESIDE)
     fine = _shift(whitening, WHITENING_BITS)
     integers = np.rint(np.ldexp(whitening, fine))
     digits = _shift(z @ whitening, STORED_BITS - 1)
     unit = 2.0 ** -(digits + STEP_BITS)
-    point = NoveltyPoint(mean, gain, integers, fine - digits, z, unit)
-    return replace(point, rows=_coordinates(z, point))
+    none = np.ones(len(z))
+    point = NoveltyPoint(mean, gain, integers, fine - digits, z, weights, none, unit)
+    rows = _coordinates(z, point)
+    return replace(point, rows=rows, nearness=_nearness(rows * weights, labels))
+
+
+def _turned(whitening: Floats, z: Floats, labels: Strings) -> tuple[Floats, int]:
+    """A whitening turned so that the discriminants of the labels come first, and how
+    many they are."""
+    whitened = z @ whitening
+    names, classes = np.unique(labels, return_inverse=True)
+    sizes = np.bincount(classes)
+    means = np.stack([whitened[classes == i].mean(axis=0) for i in range(len(names))])
+    between = (means - whitened.mean(axis=0)) * np.sqrt(sizes)[:, None]
+    axes = np.linalg.svd(between)[2]
+    return whitening @ axes.T, min(len(names) - 1, len(axes))
+
+
+def _nearness(rows: Floats, labels: Strings) -> Floats:
+    """(n,) one over the squared spacing of each row: half its distance to the nearest
+    row of its label, and half the mean of these in its label."""
+    distances = cdist(rows, rows)
+    np.fill_diagonal(distances, np.inf)
+    distances[labels[:, None] != labels] = np.inf
+    alone = distances.min(axis=1)
+    has_others = np.isfinite(alone)
+    usual = float(alone[has_others].mean()) if has_others.any() else 1.0
+    alone[~has_others] = usual
+    _, classes = np.unique(labels, return_inverse=True)
+    of_label = np.bincount(classes, alone) / np.bincount(classes)
+    spacing = np.maximum(0.5 * (alone + of_label[classes]), 1.0)
+    return _in_float32(spacing**-2.0)
 
 
 def held_out_scores(
@@ -222,8 +286,8 @@ def held_out_scores(
     folds: Integers,
     widths: Sequence[int],
     jobs: int = 1,
-) -> Floats:
-    """(decision points, n) scores of trials by spaces without their fold.
+) -> Scores:
+    """The scores of trials (n,) by spaces without their fold.
 
     Args:
         X: (decision points, n, p).
@@ -234,10 +298,10 @@ def held_out_scores(
     """
     count = int(folds.max()) + 1
     work = (delayed(_fold_scores)(X, labels, folds == k, widths) for k in range(count))
-    scores = np.full(X.shape[:2], np.nan)
-    for k, fold_scores in enumerate(Parallel(n_jobs=jobs)(work)):
-        scores[:, folds == k] = fold_scores
-    return scores
+    scores = np.full((2, *X.shape[:2]), np.nan)
+    for k, of_fold in enumerate(Parallel(n_jobs=jobs)(work)):
+        scores[:, :, folds == k] = of_fold
+    return Scores(*scores)
 
 
 def _fold_scores(
@@ -245,32 +309,33 @@ def _fold_scores(
     labels: Strings,
     left_out: Booleans,
     widths: Sequence[int],
-) -> Floats:
+) -> Scores:
     with single_thread():
         space = NoveltySpace.of(X[:, ~left_out], labels[~left_out], widths)
         return space.scores(X[:, left_out])
 
 
-def limits_of(task: str, scores: Floats) -> Novelty:
-    """The limits above which contacts count as unlike all training trials.
+def limits_of(scores: Floats, rate: float) -> tuple[tuple[float, ...], ...]:
+    """(decision points,) typical scores, which half exceed, and the limits that a share
+    `rate` of contacts exceeds.
 
-    Up to a tenth of the scores they are quantiles. Few scores lie beyond, so the tail of
-    the logarithm is taken for exponential, with the mean excess over that tenth.
+    Few scores lie beyond a tenth. So the tail of the logarithm is taken for
+    exponential, with the mean excess over that tenth.
 
     Args:
-        task: names nothing for a contact beyond its limit.
         scores: (decision points, n) of held-out trials.
+        rate: at most a tenth.
     """
+    logs = np.log(np.maximum(scores, 1e-300))
+    tails = np.quantile(logs, 1.0 - TAIL, axis=1)
     limits = []
-    for row in np.log(np.maximum(scores, 1e-300)):
-        tail = float(np.quantile(row, 1.0 - TAIL))
+    for row, tail in zip(logs, tails.tolist(), strict=True):
         excess = float((row[row >= tail] - tail).mean())
-        of_point = []
-        for rate in NOVELTY_RATES:
-            if rate >= TAIL:
-                limit = float(np.quantile(row, 1.0 - rate))
-            else:
-                limit = tail + excess * math.log(TAIL / rate)
-            of_point.append(math.exp(limit))
-        limits.append(tuple(of_point))
-    return Novelty(task, NOVELTY_RATES, tuple(limits))
+        limits.append(math.exp(tail + excess * math.log(TAIL / rate)))
+    typical = np.exp(np.median(logs, axis=1)).tolist()
+    return tuple(typical), tuple(limits)
+
+
+def beyond(limits: Sequence[float], scores: Floats) -> Booleans:
+    """(decision points, m) whether scores lie beyond the limits of their points."""
+    return np.asarray(scores > np.array(limits)[:, None])

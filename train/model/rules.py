@@ -15,7 +15,7 @@ a fold's trials come from a logistic regression on the other folds.
 Tasks that agree (`edge.model.agreement`) have one rule: the factors are decided when
 each is sure, their product when both are, and the tests count the product's errors.
 Below the smallest error that is certified for the product, each factor has rules of its
-own.
+own. Where these are faster, the product waits for a fixed window (`agreeing`).
 
 The tests are exact for the average of the folds' models. The exported model is fitted
 on all trials, a tenth (or a fifth) more, with its own choice of settings. On average it
@@ -25,7 +25,7 @@ explains. With the full risk for the tests, the smallest certified error was exc
 14 to 22 of 100 sets instead of ten, so they take half of it. `make risk` counts it.
 """
 
-from collections.abc import Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -33,7 +33,9 @@ from scipy.special import expit
 from scipy.stats import beta
 
 from edge.arrays import Booleans, Floats, Integers
-from edge.model.info import TEST_SHARE, StoppingRule
+from edge.early import is_fixed
+from edge.model.info import StoppingRule
+from edge.model.refusal import TEST_SHARE
 
 RISK = 0.1
 """Probability that a certificate is wrong."""
@@ -51,17 +53,17 @@ def upper_limit(wrong: int, trials: int, level: float) -> float:
     return float(beta.ppf(1.0 - level, wrong + 1, trials - wrong))
 
 
-def stops(confidence: Floats, rule: StoppingRule, unknown: Booleans) -> Integers:
+def stops(confidence: Floats, rule: StoppingRule, unusual: Booleans) -> Integers:
     """(n,) the decision point at which a rule decides, as `edge.Classifier` does.
 
     Args:
         confidence: (points, n) that the labels are right, by the curve of all points.
         rule: the rule.
-        unknown: (points, n) whether the contact is unlike all trained ones, and so
+        unusual: (points, n) whether the contact is unlike all trained ones, and so
             waits.
     """
-    decides = (confidence >= rule.confidence) & ~unknown
-    decides[rule.last :] = ~unknown[rule.last :]
+    decides = (confidence >= rule.confidence) & ~unusual
+    decides[rule.last :] = ~unusual[rule.last :]
     decides[-1] = True
     return np.asarray(decides.argmax(axis=0))
 
@@ -75,25 +77,27 @@ class Course:
             parts of a product are its two factors, and it is decided when both are; any
             other task is its only part.
         wrong: (decision points, n) of each part.
-        unknown: (decision points, n) whether the contact is unlike all trained ones.
-        withheld: whether the task names nothing for an unknown contact.
+        unusual: (decision points, n) whether the contact is unlike all trained ones.
+        withheld: (decision points, n) whether the task names nothing, as the thing is
+            unknown; None of a task that always answers.
     """
 
     confidences: Sequence[Floats]
     wrong: Sequence[Booleans]
-    unknown: Booleans
-    withheld: bool = False
+    unusual: Booleans
+    withheld: Booleans | None = None
 
     def under(self, rule: StoppingRule) -> tuple[Integers, Booleans]:
         """(n,) the decision point at which a rule decides, and whether the answer is
         wrong."""
-        trials = np.arange(self.unknown.shape[1])
-        at = [stops(confidence, rule, self.unknown) for confidence in self.confidences]
+        trials = np.arange(self.unusual.shape[1])
+        at = [stops(confidence, rule, self.unusual) for confidence in self.confidences]
         last = np.max(at, axis=0)
         pairs = zip(self.wrong, at, strict=True)
         wrong = [of_part[points, trials] for of_part, points in pairs]
-        withheld = self.unknown[last, trials] & self.withheld
-        return last, np.any([*wrong, withheld], axis=0)
+        if self.withheld is not None:
+            wrong.append(self.withheld[last, trials])
+        return last, np.any(wrong, axis=0)
 
 
 def candidates(points: int) -> tuple[StoppingRule, list[list[StoppingRule]]]:
@@ -113,7 +117,7 @@ def certify(course: Course, seconds: Floats) -> list[StoppingRule]:
         course: of the task, on the calibration trials.
         seconds: (points,) windows.
     """
-    n = course.unknown.shape[1]
+    n = course.unusual.shape[1]
     full_level = TEST_SHARE * RISK
 
     def tested(rule: StoppingRule, level: float, before: float) -> StoppingRule:
@@ -130,7 +134,7 @@ def certify(course: Course, seconds: Floats) -> list[StoppingRule]:
             passed.append(tested(rule, full_level / len(families), before))
             before = passed[-1].error
     # Among equal rules the fixed window comes first, as it needs no confidence.
-    passed.sort(key=lambda rule: (rule.error, rule.mean_s, not rule.fixed))
+    passed.sort(key=lambda rule: (rule.error, rule.mean_s, not is_fixed(rule)))
     best: list[StoppingRule] = []
     for rule in passed:
         if rule.error < 1.0 and (not best or rule.mean_s < best[-1].mean_s - 1e-9):
@@ -138,20 +142,58 @@ def certify(course: Course, seconds: Floats) -> list[StoppingRule]:
     return best or [passed[0]]
 
 
-def following(
-    factor: Sequence[StoppingRule],
-    product: Sequence[StoppingRule],
-    course: Course,
+def agreeing(
+    product: str,
+    factors: Collection[str],
+    rules: Mapping[str, Sequence[StoppingRule]],
+    courses: Mapping[str, Course],
     seconds: Floats,
-) -> list[StoppingRule]:
-    """The rules of a factor: those of its product, and before them its own that err
-    less often.
+) -> dict[str, list[StoppingRule]]:
+    """{task: its rules} of a product and of its factors, which follow the product's
+    rules at a pace of their own.
 
     A factor is wrong only where its product is, so it may follow the product's rules.
+    Before them it has its own that err less often. No rule is slower for a factor than
+    those before it: one that waits for confidence is left out then, and a fixed window
+    serves the product alone, which needs no answers of its factors for it.
+
+    Args:
+        product: a task.
+        factors: its factors.
+        rules: {task: its certified rules}.
+        courses: {task: its course}.
+        seconds: (points,) windows.
     """
-    stricter = [rule for rule in factor if rule.error < product[0].error]
-    followed = [
-        replace(rule, mean_s=float(seconds[course.under(rule)[0]].mean()))
-        for rule in product
-    ]
-    return [*stricter, *followed]
+    least = rules[product][0].error
+    agreed: dict[str, list[StoppingRule]] = {product: []}
+    for factor in factors:
+        agreed[factor] = [rule for rule in rules[factor] if rule.error < least]
+    for rule in rules[product]:
+        followed = _followed(rule, {f: agreed[f] for f in factors}, courses, seconds)
+        if is_fixed(rule) or len(followed) == len(factors):
+            followed[product] = rule
+        elif not agreed[product]:
+            # The full window errs no more often than any rule that is tested after it.
+            waits = replace(rule, mean_s=float(seconds[-1]), confidence=NEVER)
+            followed = {product: waits}
+        else:
+            followed = {}
+        for task, of_task in followed.items():
+            agreed[task].append(of_task)
+    return agreed
+
+
+def _followed(
+    rule: StoppingRule,
+    rules: Mapping[str, Sequence[StoppingRule]],
+    courses: Mapping[str, Course],
+    seconds: Floats,
+) -> dict[str, StoppingRule]:
+    """{factor: a rule} of those that it makes no slower than their rules so far."""
+    followed = {}
+    for factor, before in rules.items():
+        at, _ = courses[factor].under(rule)
+        mean_s = float(seconds[at].mean())
+        if not before or mean_s <= before[-1].mean_s + 1e-9:
+            followed[factor] = replace(rule, mean_s=mean_s)
+    return followed

@@ -14,8 +14,9 @@ from sklearn.metrics import precision_recall_fscore_support
 from edge.arrays import Integers
 from edge.model.model import Model
 from edge.tools.explanation import Explanation, Space, explain
+from edge.tools.info import doubt
 from train.choose.evaluate import Result
-from train.data.folds import stratified_folds
+from train.data.folds import finest, stratified_folds
 from train.data.labels import NO_CONTACT
 from train.data.vectors import Strings, Vectors
 from train.draw.explanation import MOST_NEAR, Case, draw_case
@@ -24,6 +25,7 @@ from train.model.pipeline import (
     Choice,
     Choices,
     ContactClassifier,
+    Fits,
     FittedTask,
     fittable,
 )
@@ -77,11 +79,30 @@ class Exported:
     prices: Prices
 
 
+Shared = dict[bytes, Fits]
+"""{numbers of training trials: fits on them}."""
+
+
+def _without_fold(
+    vectors: Vectors,
+    choices: Choices,
+    tests: Mapping[str, Integers],
+) -> dict[str, tuple[list[Strings], dict[int, Explanation]]]:
+    """{task: the results of `_left_out`} of tasks with the same settings, which share
+    their fits, from {task: its left-out trials}."""
+    shared: Shared = {}
+    return {
+        task: _left_out(vectors, task, choices, test, shared)
+        for task, test in tests.items()
+    }
+
+
 def _left_out(
     vectors: Vectors,
     task: str,
     choices: Choices,
     test: Integers,
+    shared: Shared,
 ) -> tuple[list[Strings], dict[int, Explanation]]:
     """[quarter] (test,) answers to left-out trials, and explanations as `Answers` has
     them.
@@ -91,20 +112,23 @@ def _left_out(
         task: the task to answer.
         choices: each task's settings, chosen without the left-out trials.
         test: the left-out trials.
+        shared: fits that are taken, and added to.
     """
     labels = vectors.y[task]
     classes, index = np.unique(labels, return_inverse=True)
     counting = labels != ""
     counting[test] = False
     training = np.flatnonzero(counting)
-    quarter_of = stratified_folds(labels[training], QUARTERS)
+    strata = vectors.y[finest({of: vectors.y[of] for of in choices})]
+    quarter_of = stratified_folds(strata[training], QUARTERS)
     X = vectors.X[test]
     answers = []
     for quarter in range(QUARTERS):
         train = training[quarter_of <= quarter]
         fewer = vectors.part(train)
         possible = fittable(choices, fewer.y)
-        model = ContactClassifier.of(possible, fewer)
+        fits = shared.setdefault(train.tobytes(), {})
+        model = ContactClassifier.of(possible, fewer, fits)
         answers.append(model.tasks_[task].classes[model.decide(X)[task].labels])
     _, voters = model.tasks_[task].neighbours(X)
     space = _space(model.tasks_[task], index[train])
@@ -152,7 +176,7 @@ def answers_of(fitted: Fitted, jobs: int = 1) -> dict[str, Answers]:
             choices += by_task.values()
     _, vectors = fitted.selection(choices)
     answers = {}
-    cases = []
+    cases: dict[tuple[object, ...], tuple[Choices, dict[str, Integers]]] = {}
     for task, chosen in fitted.chosen.items():
         labels = vectors.y[task]
         tested = (chosen.folds >= 0) & (labels != "")
@@ -162,12 +186,15 @@ def answers_of(fitted: Fitted, jobs: int = 1) -> dict[str, Answers]:
         for fold, by_task in enumerate(chosen.by_fold):
             test = np.flatnonzero(tested & (chosen.folds == fold))
             if test.size:
-                cases.append((task, by_task, test))
-    left_out = partial(_left_out, vectors)
-    results = Workers(jobs, progress=False).map("report", left_out, cases)
-    for (task, _, test), (answered, explained) in zip(cases, results, strict=True):
-        answers[task].answers[:, test] = answered
-        answers[task].explained.update(explained)
+                key = (chosen.left_out, fold, *by_task)
+                cases.setdefault(key, (by_task, {}))[1][task] = test
+    without_fold = partial(_without_fold, vectors)
+    of_cases = list(cases.values())
+    results = Workers(jobs, progress=False).map("report", without_fold, of_cases)
+    for (_, tests), by_task in zip(of_cases, results, strict=True):
+        for task, (answered, explained) in by_task.items():
+            answers[task].answers[:, tests[task]] = answered
+            answers[task].explained.update(explained)
     return answers
 
 
@@ -199,6 +226,7 @@ def write(
         "fifths of the trials, because that model differs from those of the folds. "
         "Where entire groups are held out they count groups, whose trials are right or "
         "wrong together.",
+        *doubt(model.info.stopping),
         *(
             line[0].upper() + line[1:] + "."
             for line in (*fitted.notes, *warnings(fitted))
@@ -401,7 +429,9 @@ def _sizes(exported: Exported) -> Section:
         "nested cross-validation, and stand with their 95 % intervals. The times are "
         "for features and decision together on this machine; `edge-classify bench` "
         "measures those of a board. A star marks the candidate chosen for a task, "
-        "which is the smallest one within a standard error of the best."
+        "which is the smallest one within a standard error of the best, or among fewer "
+        "than 100 single trials the most accurate. A candidate without a number was "
+        "dropped after a few folds, as behind or no better than a cheaper one."
     ]
     return Section(
         "Candidates, sizes and times",

@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 
+from edge import statistics
 from edge.arrays import Booleans, Floats, Integers
 from edge.touch.features import FEATURES
 from train.choose.crossval import MAX_COMPONENTS, accuracies, neighbours
@@ -117,20 +118,13 @@ def paired(before: Booleans, after: Booleans) -> tuple[float, float, float]:
     """The change of accuracy on the same trials in percentage points, and its 95 %
     interval.
 
-    The interval is Wald's after half a trial is added to each cell of the two-by-two
-    table (Agresti and Min, Simple improved confidence intervals for comparing matched
-    proportions, 2005).
+    The interval is that of `edge.statistics.paired`.
     """
     gained = int((after & ~before).sum())
     lost = int((before & ~after).sum())
-    total = len(before) + 2.0
-    gap = (gained - lost) / total
-    reach = 1.96 * float(np.sqrt(((gained + lost + 1.0) / total - gap**2) / total))
-    return (
-        100.0 * (gained - lost) / len(before),
-        100.0 * (gap - reach),
-        100.0 * (gap + reach),
-    )
+    total = len(before)
+    low, high = statistics.paired(gained, lost, total)
+    return 100.0 * (gained - lost) / total, 100.0 * low, 100.0 * high
 
 
 def points(gain: tuple[float, float, float]) -> str:

@@ -10,6 +10,7 @@ from sklearn.neighbors import NearestNeighbors
 
 from edge.arrays import Floats, Integers
 from edge.errors import printable
+from edge.tools.info import doubt
 from edge.touch import measures
 from train.choose.settings import Chosen
 from train.data import outliers
@@ -40,7 +41,8 @@ def summary(fitted: Fitted, prices: Prices) -> str:
     text."""
     lines = [
         *_aligned(candidates(fitted, prices)),
-        "* chosen; in brackets, the 95 % interval of the accuracy on other trials",
+        "* chosen; in brackets, the 95 % interval of the accuracy on other trials; "
+        "- dropped after a few folds, as behind or no better than a cheaper one",
         "",
     ]
     for task, chosen in fitted.chosen.items():
@@ -53,6 +55,8 @@ def summary(fitted: Fitted, prices: Prices) -> str:
     if any(map(moves, map(measures.feature, fitted.dataset.names))):
         frame = "along the skin" if fitted.dataset.chain is None else "in the world"
         lines.append(f"contact motion is measured {frame}")
+    if fitted.sequential is not None:
+        lines += doubt(fitted.sequential.stopping_)
     return "\n".join([*lines, *fitted.notes, *warnings(fitted)])
 
 
@@ -76,17 +80,21 @@ def _by_unit(units: Mapping[str, str]) -> list[str]:
 
 
 def candidates(fitted: Fitted, prices: Prices) -> Table:
-    """A row for each candidate, with the nested accuracy of its own settings and its
-    price."""
+    """A row for each candidate that was not dropped, with the nested accuracy of its
+    own settings and its price."""
     rows: list[Row] = []
     for i, candidate in enumerate(fitted.candidates):
         pairs = {(grid.features, grid.projection) for grid in candidate.grids}
+        if not any(chosen.candidates[i] for chosen in fitted.chosen.values()):
+            continue
         row: Row = {"features": candidate.name, "projection": candidate.projection}
         for task, chosen in fitted.chosen.items():
             choice = chosen.choice
             star = "*" if (choice.features, choice.projection) in pairs else " "
             result = chosen.candidates[i]
-            row[task] = f"{result.accuracy:.1%} ({interval(result)}){star}"
+            row[task] = "- "
+            if result is not None:
+                row[task] = f"{result.accuracy:.1%} ({interval(result)}){star}"
         us, kilobytes = prices[i]
         row["us per decision"] = round(us, 1)
         row["kB"] = round(kilobytes, 1)
@@ -172,7 +180,7 @@ def _left_out(dataset: DataSet) -> Iterator[str]:
 
 
 def _outliers(fitted: Fitted) -> Iterator[str]:
-    """Sentences on recordings far outside all others.
+    """Sentences on recordings far outside all others, by features of the model.
 
     Features of single taxels are left out: most trials do not touch a taxel, so that
     any touch of it lies far outside.
@@ -183,15 +191,12 @@ def _outliers(fitted: Fitted) -> Iterator[str]:
     more = len(by_joints) - NAMED
     if more > 0:  # angles in degrees are beyond the limits in every recording
         yield f"warning: {counted(more, 'further recording')} with such joint angles"
-    names = [n for n in measured.names if not measures.feature(n).wide]
+    names = [n for n in fitted.dataset.names if not measures.feature(n).wide]
     names = [name for name in names if "kernels" not in name]
-    if not names:
-        return
-    measured_of_names = measured.of(names)
-    X = measured_of_names.features(fitted.window_s, fitted.samples)
-    yield from outliers.by_features(
-        measured_of_names, X, measured_of_names.widths(fitted.samples)
-    )
+    if names:
+        used = fitted.dataset.of(names)
+        X = used.features(fitted.window_s, fitted.samples)
+        yield from outliers.by_features(used, X, used.widths(fitted.samples))
 
 
 def _task_warnings(fitted: Fitted, task: str) -> Iterator[str]:

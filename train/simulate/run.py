@@ -1,6 +1,7 @@
 """Recordings of a scene's trials."""
 
 import math
+from collections import Counter
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from itertools import chain
@@ -25,7 +26,7 @@ class Written:
 
     Attributes:
         paths: the files.
-        redrawn: number of trials that were drawn again.
+        redrawn: {reason: number of trials that were drawn again for it at first}.
         unfelt: number of trials in which no taxel rises above the skin's onset.
         rough: {the first object and condition of a kind: the error of its step, as a
             part of the peak force} where the step was measured and none is within the
@@ -33,7 +34,7 @@ class Written:
     """
 
     paths: list[Path]
-    redrawn: int
+    redrawn: dict[str, int]
     unfelt: int
     rough: dict[str, float]
 
@@ -99,8 +100,8 @@ def simulate_trials(
     scene: Scene, specs: tuple[TrialSpec, ...]
 ) -> Iterator[tuple[str, Recording]]:
     """(file name, recording) of trials, each drawn until it fits its label."""
-    for physics, true in true_runs(scene, specs):
-        yield from recordings(physics, true)
+    for run in true_runs(scene, specs):
+        yield from recordings(run.physics, run.which)
 
 
 def batches_of(
@@ -149,21 +150,21 @@ def write(
     first = {kind: specs[0] for kind, specs in kinds(scene).items()}
     batches = batches_of(scene, convergences=convergences)
     paths = []
-    redrawn = 0
+    redrawn: Counter[str] = Counter()
     unfelt = 0
-    simulated = (simulate_trials(scene, specs) for specs in batches)
-    for name, trial in chain.from_iterable(simulated):
-        saving.save(target / name, trial, lasting=False)
-        paths.append(target / name)
-        redrawn += trial.meta["simulation"]["redrawn"] > 0
-        unfelt += trial.frames.max(initial=0) <= scene.skin.onset
-        progress(1)
+    for run in chain.from_iterable(true_runs(scene, specs) for specs in batches):
+        redrawn.update(run.redrawn)
+        for name, trial in recordings(run.physics, run.which):
+            saving.save(target / name, trial, lasting=False)
+            paths.append(target / name)
+            unfelt += trial.frames.max(initial=0) <= scene.skin.onset
+            progress(1)
     rough = {
         first[kind].key: convergence.error
         for kind, convergence in convergences.items()
         if not convergence.within
     }
-    return Written(sorted(paths), redrawn, int(unfelt), rough)
+    return Written(sorted(paths), dict(redrawn), int(unfelt), rough)
 
 
 def total_trials(scene: Scene) -> int:

@@ -32,14 +32,31 @@ class Contradiction:
 
     Attributes:
         label: `soft`, or the trial's condition.
+        reason: for which it is drawn again, such as "moved too little".
         course: the end of a sentence that begins with the trial, such as "was never
             touched".
         remedy: a change of the scene that may help.
     """
 
     label: str
+    reason: str
     course: str
     remedy: str
+
+
+@dataclass(frozen=True)
+class TrueRun:
+    """A run of trials.
+
+    Attributes:
+        physics: the run.
+        which: its trials that fit their labels.
+        redrawn: the reason for each trial that is drawn again after its first draw.
+    """
+
+    physics: PhysicsRun
+    which: Places
+    redrawn: list[str]
 
 
 def contradictions(physics: PhysicsRun) -> list[Contradiction | None]:
@@ -63,11 +80,13 @@ def contradictions(physics: PhysicsRun) -> list[Contradiction | None]:
         key = FAMILIES[trial.object.family].thickness
         thickness = trials.values[key][i] if key else 0.0
         label = trial.condition
-        course = ""
+        reason = ""
         if not touched[i, onset[i]]:
+            reason = "never touched"
             course = "was never touched"
             remedy = "let [motion] reach it, and turn the skin's columns to it"
         elif trial.condition == "movable" and slide[i] < labels["slides_m"]:
+            reason = "moved too little"
             course = (
                 f"moved {1e3 * slide[i]:.0f} mm, less than {1e3 * labels['slides_m']:g}"
             )
@@ -77,16 +96,15 @@ def contradictions(physics: PhysicsRun) -> list[Contradiction | None]:
             )
         elif depth[i] < labels["yields"] * thickness:
             label = "soft"
+            reason = "yielded too little"
             course = f"yielded {100 * depth[i] / thickness:.1f} % of {1e3 * thickness:.0f} mm"
             remedy = "lower its stiffness, or labels.yields"
-        out.append(Contradiction(label, course, remedy) if course else None)
+        out.append(Contradiction(label, reason, course, remedy) if reason else None)
     return out
 
 
-def true_runs(
-    scene: Scene, specs: tuple[TrialSpec, ...]
-) -> Iterator[tuple[PhysicsRun, Places]]:
-    """Runs of trials, and which trials of each run fit their labels.
+def true_runs(scene: Scene, specs: tuple[TrialSpec, ...]) -> Iterator[TrueRun]:
+    """Runs of trials until each fits its label.
 
     Each trial fits its label in exactly one of the runs; its draws depend on nothing
     but itself.
@@ -105,7 +123,8 @@ def true_runs(
                 fits.setdefault((spec.key, spec.number), i)
             else:
                 wrong[spec.key, spec.number] = spec, contradiction
-        yield physics, np.array(sorted(fits.values()), dtype=int)
+        redrawn = [why.reason for spec, why in wrong.values() if spec.attempt == 0]
+        yield TrueRun(physics, np.array(sorted(fits.values()), dtype=int), redrawn)
         retries = [wrong[trial] for trial in wrong if trial not in fits]
         specs = tuple(spec for last in retries for spec in _next_draws(scene, *last))
 

@@ -6,15 +6,13 @@ from train.data.folds import finest
 from train.report.figures import HATCHES, PHONE, STROKES, curve, legend, picture, spread
 from train.report.score import majority, percent, points, shares
 from train.report.section import Figure, Row, Section, Table
-from train.tradeoff.choices import BETWEEN_S, unseen
+from train.tradeoff.choices import unseen
 from train.tradeoff.early import FOLDS, StoppingComparison
 from train.tradeoff.measured import Measured
 from train.tradeoff.slider import slider
-from train.tradeoff.uses import EARLY, cheapest, distinct, uses
+from train.tradeoff.uses import EARLY, cheapest, uses
 
-TABLE_S = (0.2, 0.4, 0.6, 0.8, 1.0, 1.2)
-"""Windows in the tables."""
-TITLE_S = (0.4, 1.2)
+TITLE_S = (0.6, 1.2)
 """Windows with their accuracy in a panel's title."""
 ACROSS = 3
 """At most so many panels stand side by side."""
@@ -28,8 +26,6 @@ def answers(measured: Measured, task: str) -> list[Row]:
         row |= shares(use.result)
         window = use.window_s
         if window is not None:
-            if window not in TABLE_S and window <= TABLE_S[-1]:
-                continue
             unseen_result = unseen(measured.points[window][task])
             row["unseen objects %"] = (
                 "" if unseen_result is None else percent(unseen_result.accuracy)
@@ -63,11 +59,10 @@ def early(measured: Measured) -> Section:
             "requested error %": percent(rule.error),
             "right %": percent(1.0 - rule.wrong),
             "mean time s": round(rule.mean_s, 3),
+            "at most s": round(rule.latest_s, 3),
             "points over waiting": points(rule.gain),
             "no label %": percent(rule.unknown),
             "decided early %": percent(rule.early),
-            "certified in folds": f"{rule.folds} of {FOLDS}",
-            "contacts": len(rule.right),
         }
         for task, compared in measured.comparisons.items()
         for rule in compared.certified
@@ -145,13 +140,12 @@ def reasons(measured: Measured) -> Section:
         )
     commands = measured.commands
     windows = ", ".join(f"{window:g}" for window in measured.points)
-    between = " and ".join(f"{window:g}" for window in BETWEEN_S)
     kind = "quick choice" if commands.quick else "choice of `make export`"
     notes += [
         *measured.notes,
         f"All accuracies belong to the {kind}, made at windows of "
-        f"{windows} s; {between} s are skipped where the accuracies of "
-        f"{next(iter(measured.y))} before and after do not differ by more than chance. "
+        f"{windows} s. Windows between two of these were not measured, as the accuracies "
+        f"of {next(iter(measured.y))} there do not differ by more than chance. "
         "To export one of "
         f"the measured models, use `{commands.front('fast')}`, or `balanced` (a window "
         "of at most 0.9 s) or `accurate` in place of `fast`; `500` is the most accurate "
@@ -179,8 +173,9 @@ GLOSSARY = {
         "The 95 % interval for the exported model's accuracy on other contacts. It is "
         "Wilson's binomial interval for two fifths of the contacts, because the "
         "exported model differs from those that were tested. `make risk` counts how "
-        "often it holds. For early decisions, only the contacts of the folds that "
-        "certified the error rate count."
+        "often it holds. Early decisions and fixed windows have the same contacts. A "
+        "mean time has the normal interval's upper end, as the exported model is sure "
+        "sooner than those that were tested."
     ),
     "points": (
         "The percentage of decisions that become right less the percentage that become "
@@ -262,7 +257,7 @@ def _panel(
     times = [window + after_s for window in results]
     curve(axes, 0, "after a fixed time", times, list(results.values()))
     colour, marker, dashes = STROKES[1]
-    rules = distinct(compared)
+    rules = compared.certified
     if rules:
         share, arms = spread([rule.result for rule in rules])
         axes.errorbar(

@@ -78,9 +78,9 @@ def section(board: Board) -> Section:
             "finds the contact in a frame; `track` does this and measures the contact; "
             "`answer` is features and decision; `frame` and `last` are all work for a "
             "frame in a contact, and for the frame that decides. The arithmetic of a "
-            "decision is the sum of the medians of track, features and decision. Another "
-            "board has other times: run `edge-classify bench` on it, and give the file "
-            "as `BOARD=board.json`.",
+            "decision is the sum of the medians of track, features and decision. `make "
+            "tradeoff` measures a quick model. Another board has other times: run "
+            "`edge-classify bench` on it, and give the file as `BOARD=board.json`.",
         ],
         [Table("board", "Stages", rows, timed=("median us", "99th percentile us"))],
     )

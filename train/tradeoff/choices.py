@@ -3,6 +3,7 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -25,9 +26,8 @@ WINDOWS_S = tuple(round(0.1 * i, 1) for i in range(2, 13))
 """Decision points of the report's early decisions."""
 CHOSEN_S = (0.2, 0.4, 0.6, 0.8, 0.9, 1.0, 1.1, 1.2)
 """Windows of the report, closer where most things begin to move."""
-BETWEEN_S = {0.9: (0.8, 1.0), 1.1: (1.0, 1.2)}
-"""{window: those before and after it}; where the main task's accuracies at these do not differ by
-more than chance, the curve is flat and the window is left out."""
+FIRST_S = (0.6, WINDOW_S)
+"""Those that are measured whatever the curve, beside the shortest and the longest."""
 Points = Mapping[float, Mapping[str, Chosen]]
 """{window: {task: the choice at that window}}."""
 
@@ -109,21 +109,29 @@ def choices_at(
     *,
     quick: bool,
 ) -> Points:
-    """The choice at each window, but for those of `BETWEEN_S` where a task's curve is
-    flat."""
-
-    def made(times_s: Sequence[float]) -> dict[float, dict[str, Chosen]]:
+    """The choice at the first windows, and at one in the middle between each two at
+    which a task's accuracies differ by more than chance."""
+    points: dict[float, dict[str, Chosen]] = {}
+    ends = {windows[0], windows[-1]}
+    times_s = [w for w in windows if w in ends or w in FIRST_S]
+    while times_s:
         cases = [(dataset, window_s) for window_s in times_s]
         results = workers.map("windows", partial(chosen, quick=quick), cases)
-        return dict(zip(times_s, results, strict=True))
+        points |= dict(zip(times_s, results, strict=True))
+        accuracies = {w: points[w][task] for w in sorted(points)}
+        times_s = _between(windows, accuracies)
+    return dict(sorted(points.items()))
 
-    points = made([w for w in windows if w not in BETWEEN_S])
-    steep = []
-    for window_s in filter(BETWEEN_S.get, windows):
-        before_s, after_s = BETWEEN_S[window_s]
-        if differ(points[before_s][task], points[after_s][task]):
-            steep.append(window_s)
-    return dict(sorted((points | made(steep)).items()))
+
+def _between(windows: Sequence[float], made: Mapping[float, Chosen]) -> list[float]:
+    """The middle one of the windows between each two, with a task's choices, that
+    differ."""
+    middles = []
+    for before_s, after_s in pairwise(made):
+        between = [w for w in windows if before_s < w < after_s]
+        if between and differ(made[before_s], made[after_s]):
+            middles.append(between[(len(between) - 1) // 2])
+    return middles
 
 
 def differ(before: Chosen, after: Chosen) -> bool:

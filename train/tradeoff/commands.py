@@ -43,6 +43,11 @@ class Commands:
             return f"{self._export} --front {point} --fronts {file}"
         return f"make export{self._facts} FRONT={point}"
 
+    def run(self, error: float) -> str:
+        """The command that decides early with the exported model, less its skin."""
+        model = shlex.quote(str(self._models / "model.onnx"))
+        return f"edge-classify run --model {model} --error {error:g}"
+
     def tradeoff(self, options: str) -> str:
         """The command that makes this report with other options."""
         words = ["--quick"] if self.quick else []

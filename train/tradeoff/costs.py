@@ -188,7 +188,7 @@ def measure(
     """
     full = hits(dataset, windows[WINDOW_S])
     rows = []
-    for w in WAITS_S:
+    for w in filter(windows.__contains__, WAITS_S):
         wait = Change(f"waiting {w:g} s", f"{WINDOW_S - w:.1f} s sooner", dataset)
         rows.append(row_of(wait, full, hits(dataset, windows[w]), 0.0))
     thorough = Change(ALL, "longer training", raw, options={"quick": False})

@@ -7,8 +7,10 @@ from typing import Any
 import numpy as np
 
 from edge.arrays import Booleans, Floats, Integers
-from edge.model.info import Stopping, StoppingRule
-from train.choose.evaluate import Promise, Result
+from edge.early import fastest
+from edge.model.info import Stopping
+from edge.statistics import Z
+from train.choose.evaluate import VARIANCE, Promise, Result
 from train.data.dataset import DataSet
 from train.data.folds import finest, group_folds, stratified_folds
 from train.data.groups import TRIAL, groupable
@@ -24,30 +26,44 @@ BINS = 10
 
 @dataclass(frozen=True)
 class Certified:
-    """Decisions with a requested error rate, over the folds in which it was certified.
+    """Decisions with an error rate that the model of all contacts certifies.
+
+    Each contact is decided by a model of the other folds, at the confidence that the
+    model of all contacts asks for.
 
     Attributes:
         error: the requested rate.
-        folds: number of folds, out of `FOLDS`, that certified it.
-        right: (m,) whether each contact of these folds is decided rightly. A contact
-            unlike all trained ones gets no label, which counts as wrong.
-        waited: (m,) whether the same contact is decided rightly at the full window.
+        right: (n,) whether each contact is decided rightly. A contact unlike all
+            trained ones gets no label, which counts as wrong.
+        waited: (n,) whether the same contact is decided rightly at the full window.
         unknown: share of decisions without a label.
         early: share of contacts decided before the full window.
-        mean_s: mean time to decision.
+        seconds: (n,) time of each decision.
     """
 
     error: float
-    folds: int
     right: Booleans
     waited: Booleans
     unknown: float
     early: float
-    mean_s: float
+    seconds: Floats
+
+    @property
+    def mean_s(self) -> float:
+        """Mean time to decision."""
+        return float(self.seconds.mean())
+
+    @property
+    def latest_s(self) -> float:
+        """Upper end of the 95 % interval for the exported model's mean time on other
+        contacts. It has no lower end, as the exported model was fitted on more trials
+        and is sure sooner than those of the folds."""
+        variance = VARIANCE * float(self.seconds.var()) / len(self.seconds)
+        return self.mean_s + Z * float(np.sqrt(variance))
 
     @property
     def result(self) -> Result:
-        """The accuracy on the contacts of the folds that certified it."""
+        """The accuracy."""
         return Promise(int(self.right.sum()), len(self.right))
 
     @property
@@ -72,7 +88,8 @@ class StoppingComparison:
         confidence: (decision points, n) calibrated.
         course: of all held-out trials, whose labels count even where the contact is
             unlike all trained ones.
-        certified: an entry for each requested error rate that a fold certified.
+        certified: an entry for each requested error rate that the model of all
+            contacts certifies.
     """
 
     decision_points_s: tuple[float, ...]
@@ -92,11 +109,11 @@ class StoppingComparison:
         return float(np.abs(gaps).sum() / len(right))
 
 
-def soonest_s(compared: StoppingComparison, level: float) -> float | None:
-    """The shortest mean time of early decisions of an accuracy; None where none has
-    it."""
-    means_s = (r.mean_s for r in compared.certified if 1.0 - r.wrong >= level)
-    return min(means_s, default=None)
+def soonest(compared: StoppingComparison, level: float) -> Certified | None:
+    """The early decisions of an accuracy with the shortest mean time; None where none
+    have it."""
+    able = [rule for rule in compared.certified if rule.result.accuracy >= level]
+    return min(able, key=lambda rule: rule.mean_s, default=None)
 
 
 def compare_stopping(
@@ -106,6 +123,7 @@ def compare_stopping(
     leave_out: str = TRIAL,
     quick: bool = True,
     jobs: int = 1,
+    certify: bool = False,
 ) -> dict[str, StoppingComparison]:
     """{task: early decisions compared with fixed windows}.
 
@@ -119,6 +137,7 @@ def compare_stopping(
             classes have too few groups are left out then.
         quick: whether the export tries few candidates.
         jobs: processes.
+        certify: export all trials too, to tell which error rates can be requested.
     """
     tasks, folds = _folds(dataset, leave_out)
     if not tasks:
@@ -132,7 +151,15 @@ def compare_stopping(
     }
     cases = [(dataset, folds == k, options) for k in range(FOLDS)]
     held_out = Workers(jobs).map("deciding early", _held_out, cases)
-    return {task: _compared(task, held_out, decision_points_s) for task in tasks}
+    rules: Mapping[str, Stopping] = {}
+    if certify:
+        model = fit(dataset, **{**options, "jobs": jobs}).sequential
+        assert model is not None
+        rules = model.stopping_
+    return {
+        task: _compared(task, held_out, decision_points_s, rules.get(task))
+        for task in tasks
+    }
 
 
 def _folds(dataset: DataSet, leave_out: str) -> tuple[tuple[str, ...], Integers]:
@@ -153,13 +180,11 @@ class _HeldOut:
 
     Attributes:
         test: (n,) which trials they are.
-        stopping: {task: the model's rules}.
         right, confidence: {task: (decision points, m)}.
         courses: {task: of the fold's trials}.
     """
 
     test: Booleans
-    stopping: Mapping[str, Stopping]
     right: Mapping[str, Booleans]
     confidence: Mapping[str, Floats]
     courses: Mapping[str, Course]
@@ -175,67 +200,68 @@ def _held_out(dataset: DataSet, test: Booleans, options: Mapping[str, Any]) -> _
     points = model.decision_points_s
     new = np.stack([test_set.features(s, fitted.samples, names) for s in points])
     truth = {task: test_set.labels(task) for task in model.choices}
-    return _HeldOut(test, model.stopping_, *model.judged(new, truth))
+    return _HeldOut(test, *model.judged(new, truth))
 
 
 def _compared(
     task: str,
     folds: Sequence[_HeldOut],
     decision_points_s: Sequence[float],
+    stopping: Stopping | None,
 ) -> StoppingComparison:
-    """A task's early decisions over all folds."""
+    """A task's early decisions over all folds, by the rules of the model of all
+    contacts."""
     shape = len(decision_points_s), len(folds[0].test)
     right = np.empty(shape, dtype=bool)
     confidence = np.empty(shape)
     for fold in folds:
         right[:, fold.test] = fold.right[task]
         confidence[:, fold.test] = fold.confidence[task]
-    certified = []
-    for error in ERRORS:
-        allowed = []
-        for fold in folds:
-            rule = fold.stopping[task].rule(error)
-            if rule is not None:
-                allowed.append((fold.courses[task], rule))
-        if allowed:
-            certified.append(_certified(error, allowed, decision_points_s))
-    joined = _joined([fold.courses[task] for fold in folds])
+    course = _joined([fold.courses[task] for fold in folds])
     points = tuple(decision_points_s)
-    return StoppingComparison(points, right, confidence, joined, certified)
+    certified = [] if stopping is None else _certified(course, stopping, points)
+    shown = replace(course, withheld=None)
+    return StoppingComparison(points, right, confidence, shown, certified)
 
 
 def _joined(courses: Sequence[Course]) -> Course:
-    """Courses of several folds as one that withholds no label."""
+    """The course of several folds together."""
     confidences = zip(*(course.confidences for course in courses), strict=True)
     wrong = zip(*(course.wrong for course in courses), strict=True)
+    withheld = [course.withheld for course in courses if course.withheld is not None]
     return Course(
         confidences=list(map(np.hstack, confidences)),
         wrong=list(map(np.hstack, wrong)),
-        unknown=np.hstack([course.unknown for course in courses]),
+        unusual=np.hstack([course.unusual for course in courses]),
+        withheld=np.hstack(withheld) if withheld else None,
     )
 
 
 def _certified(
-    error: float,
-    folds: Sequence[tuple[Course, StoppingRule]],
-    decision_points_s: Sequence[float],
-) -> Certified:
-    """The decisions with a requested error rate, by the rule that each fold certified
-    for it."""
+    course: Course, stopping: Stopping, decision_points_s: Sequence[float]
+) -> list[Certified]:
+    """The decisions at each error rate that a model certifies; one rule that serves
+    several rates stands at the smallest."""
     seconds = np.array(decision_points_s)
     waiting, _ = candidates(len(seconds))
-    rows = []
-    for course, rule in folds:
+    _, late = course.under(waiting)
+    rules = {fastest(stopping, error): error for error in reversed(ERRORS)}
+    certified = []
+    for rule, error in reversed(rules.items()):
+        if rule is None:
+            continue
         at, wrong = course.under(rule)
-        _, late = course.under(waiting)
-        unknown = course.unknown[at, np.arange(len(at))] & course.withheld
-        rows.append([~wrong, ~late, unknown, at < len(seconds) - 1, seconds[at]])
-    decided, waited, *shares = map(np.concatenate, zip(*rows, strict=True))
-    means = [float(share.mean()) for share in shares]
-    return Certified(
-        error,
-        len(rows),
-        decided.astype(bool),
-        waited.astype(bool),
-        *means,
-    )
+        unknown = 0.0
+        if course.withheld is not None:
+            unknown = float(course.withheld[at, np.arange(len(at))].mean())
+        certified.append(
+            Certified(
+                error=error,
+                right=~wrong,
+                waited=~late,
+                unknown=unknown,
+                early=float((at < len(seconds) - 1).mean()),
+                seconds=seconds[at],
+            )
+        )
+    return certified

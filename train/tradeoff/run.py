@@ -107,6 +107,7 @@ def tradeoff(data: Sequence[str], out: Path, board_path: str, options: Options) 
         WINDOWS_S,
         quick=quick,
         jobs=options.jobs,
+        certify=True,
     )
     sheared = None
     if dataset.layout.axes:
@@ -177,6 +178,7 @@ def _sheared(
         leave_out=LEAVE_OUT,
         quick=quick,
         jobs=jobs,
+        certify=True,
     )
     by_kind = {shear.KNOWN: comparisons, shear.UNSEEN: unseen_result}
     sheared = shear.Answers(points, by_kind)

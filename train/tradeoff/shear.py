@@ -18,7 +18,7 @@ from train.report.score import paired, percent, points
 from train.report.section import Figure, Row, Section, Table
 from train.report.work import Workers
 from train.tradeoff.choices import WINDOWS_S, Points, chosen, unseen
-from train.tradeoff.early import StoppingComparison, compare_stopping, soonest_s
+from train.tradeoff.early import StoppingComparison, compare_stopping, soonest
 from train.tradeoff.wires import microcontroller
 
 LEVELS = (0.8, 0.9, 0.95)
@@ -50,9 +50,10 @@ class Answers:
         return {w: None if h is None else float(h.mean()) for w, h in hits.items()}
 
     def early_s(self, task: str, kind: str, level: float) -> float | None:
-        """See `train.tradeoff.early`."""
+        """The shortest mean time of early decisions; None where none are so right."""
         compared = self.early[kind].get(task)
-        return None if compared is None else soonest_s(compared, level)
+        rule = None if compared is None else soonest(compared, level)
+        return None if rule is None else rule.mean_s
 
 
 @dataclass(frozen=True)
@@ -91,6 +92,7 @@ def answers(
             leave_out=leave_out,
             quick=quick,
             jobs=workers.jobs,
+            certify=True,
         )
         for kind, leave_out in ((KNOWN, TRIAL), (UNSEEN, LEAVE_OUT))
     }

@@ -3,7 +3,7 @@ other."""
 
 import html
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from string import Template
 
@@ -11,10 +11,10 @@ from train.choose.evaluate import Result
 from train.choose.settings import Chosen
 from train.report.score import interval
 from train.tradeoff.choices import unseen
-from train.tradeoff.early import soonest_s
+from train.tradeoff.early import soonest
 from train.tradeoff.front import NAMES, ParetoFront
 from train.tradeoff.measured import Measured
-from train.tradeoff.uses import cheapest
+from train.tradeoff.uses import cheapest, early, fixed
 
 FIRST_S = 1.0
 """The time shown at first; without a script, it stays."""
@@ -73,65 +73,64 @@ def slider(measured: Measured) -> str:
         first_level=at,
         last_level=len(LEVELS) - 1,
         level=FIRST_LEVEL,
-        reached=html.escape(levels[at]),
+        reached=levels[at],
         fronts=fronts(measured),
-        prices="".join(
-            f"<li>{html.escape(line)}</li>" for line in price_lines(measured)
-        ),
     )
 
 
 def reached(measured: Measured, level: float) -> str:
-    """The time after which each task reaches an accuracy, early and fixed."""
-    texts = []
+    """Rows of a table: the soonest decisions of each task that reach an accuracy,
+    early and after a fixed time, with their commands."""
+    rows = ""
     for task in measured.y:
-        times = []
-        early = soonest_s(measured.comparisons[task], level)
-        if early is not None:
-            times.append(f"{early:.2f} s on average (early)")
+        rule = soonest(measured.comparisons[task], level)
+        if rule is not None:
+            time = (
+                f"{rule.mean_s:.2f} s on average (at most {rule.latest_s:.2f}), early"
+            )
+            use = early(measured, rule)
+            rows += _row(task, f"after {time}: {_accuracy(use.result)}", use.commands)
         results = measured.results(task)
-        fixed = [window for window in results if results[window].accuracy >= level]
-        if fixed:
-            times.append(f"{min(fixed):g} s (fixed)")
-        texts.append(f"{task} {'after ' + ', '.join(times) if times else 'never'}")
-    return "; ".join(texts)
+        able = [window for window in results if results[window].accuracy >= level]
+        if able:
+            use = fixed(measured, task, min(able))
+            answer = f"after {min(able):g} s, fixed: {_accuracy(use.result)}"
+            rows += _row(task, answer, use.commands)
+        elif rule is None:
+            rows += _row(task, "never", ())
+    return rows
+
+
+def _row(name: str, answer: str, commands: Sequence[str]) -> str:
+    """A row of a table, whose last cell has the commands that make the answer."""
+    codes = [f"<code>{html.escape(command)}</code>" for command in commands]
+    cells = (html.escape(name), html.escape(answer), ", then ".join(codes))
+    return f"<tr>{''.join(f'<td>{cell}</td>' for cell in cells)}</tr>"
+
+
+def _accuracy(result: Result) -> str:
+    """An accuracy and its interval in whole percent."""
+    return f"{100 * result.accuracy:.0f} % ({interval(result)})"
 
 
 def fronts(measured: Measured) -> str:
-    """Rows of a table: what the names of `FRONT=` give."""
+    """Rows of a table for the main task: what the names of `FRONT=` give, and the
+    cheapest use."""
     task = next(iter(measured.y))
+    results = measured.results(task)
     front = ParetoFront.of(measured.points, task, measured.after_s)
     rows = ""
     for name in NAMES:
         point = front.pick(name)
-        text = f"{100 * point.accuracy:.0f} % after {point.milliseconds / 1e3:.2f} s"
-        command = html.escape(measured.commands.front(name))
-        rows += (
-            f"<tr><td>{name}</td><td>{text}</td><td><code>{command}</code></td></tr>"
-        )
-    return rows
-
-
-def price_lines(measured: Measured) -> list[str]:
-    """A line for each further price: taxels, recordings, arithmetic, a wrong
-    decision."""
-    task = next(iter(measured.y))
-    lines = []
-    for end, words in ((" taxels", "Fewer taxels"), (" trials", "Fewer recordings")):
-        rows = [row for row in measured.costs if str(row["change"]).endswith(end)]
-        for row in rows[:1]:
-            gain = row.get(f"{task}, points", "")
-            lines.append(f"{words}: {row['change']} gain {task} {gain} points.")
-    arithmetic_ms = 1e3 * measured.board.arithmetic_s
-    lines.append(
-        f"Arithmetic: {arithmetic_ms:.1f} ms a decision on {measured.board.name}."
-    )
+        answer = _accuracy(results[point.window_s])
+        text = f"{task}: {answer} after {point.milliseconds / 1e3:.2f} s"
+        rows += _row(name, text, (measured.commands.front(name),))
     best = cheapest(measured, task)
-    lines.append(
-        f"A wrong decision: at {measured.wrong:g} each, and {measured.second:g} for a "
-        f"second of waiting, {task} is cheapest {best.name}."
+    text = (
+        f"{task}: {_accuracy(best.result)} after {best.seconds:.2f} s, where a wrong "
+        f"decision costs {measured.wrong:g} and a second of waiting {measured.second:g}"
     )
-    return lines
+    return rows + _row("cheapest", text, best.commands)
 
 
 def _texts(choice: Chosen) -> dict[str, str]:

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 from train.choose.evaluate import Result
 from train.tradeoff.choices import WINDOWS_S
-from train.tradeoff.early import FOLDS, Certified, StoppingComparison
+from train.tradeoff.early import Certified
 from train.tradeoff.measured import Measured
 
 EARLY = (
@@ -12,14 +12,6 @@ EARLY = (
     f"--decision-points {WINDOWS_S[0]}:{WINDOWS_S[-1]}:0.1",
 )
 """Options that export the model whose early decisions were measured."""
-
-
-def distinct(compared: StoppingComparison) -> list[Certified]:
-    """The rules that most folds certify; one that serves two error rates stands at the
-    smaller."""
-    able = [rule for rule in compared.certified if rule.folds > FOLDS // 2]
-    rules = {(rule.mean_s, rule.wrong): rule for rule in reversed(able)}
-    return list(rules.values())[::-1]
 
 
 @dataclass(frozen=True)
@@ -45,20 +37,32 @@ class Use:
         return measured.wrong * (1.0 - accuracy) + measured.second * self.seconds
 
 
+def fixed(measured: Measured, task: str, window_s: float) -> Use:
+    """The decision of a task after a fixed window."""
+    return Use(
+        f"after {window_s:g} s",
+        window_s + measured.after_s,
+        measured.results(task)[window_s],
+        (measured.commands.export(f"--window {window_s:g}"),),
+        window_s,
+    )
+
+
+def early(measured: Measured, rule: Certified) -> Use:
+    """The early decision with an error rate."""
+    return Use(
+        f"early, at most {rule.error:.0%} wrong",
+        rule.mean_s + measured.after_s,
+        rule.result,
+        (measured.commands.export(*EARLY), measured.commands.run(rule.error)),
+    )
+
+
 def uses(measured: Measured, task: str) -> list[Use]:
-    """Every fixed window and every early decision of a task."""
-    options = []
-    for window, result in measured.results(task).items():
-        command = measured.commands.export(f"--window {window:g}")
-        seconds = window + measured.after_s
-        options.append(Use(f"after {window:g} s", seconds, result, (command,), window))
-    export = measured.commands.export(*EARLY)
-    for rule in distinct(measured.comparisons[task]):
-        name = f"early, at most {rule.error:.0%} wrong"
-        seconds = rule.mean_s + measured.after_s
-        run = f"edge-classify run --error {rule.error:g}"
-        options.append(Use(name, seconds, rule.result, (export, run)))
-    return options
+    """Every fixed window and every early decision of a task, on the same contacts."""
+    windows = [fixed(measured, task, window) for window in measured.results(task)]
+    rules = measured.comparisons[task].certified
+    return [*windows, *(early(measured, rule) for rule in rules)]
 
 
 def cheapest(measured: Measured, task: str) -> Use:

@@ -188,8 +188,8 @@ function drawDecisions(picture) {
   box.replaceChildren(...picture.decisions.map((decision) => {
     const item = element("div", undefined, "decision");
     item.append(element("div", `${decision.task}, after ${decision.window_s} s`, "task"));
-    item.append(element("strong", decision.label === null ? "out of range" : decision.label));
-    if (decision.confidence !== null) {
+    item.append(element("strong", labelOf(decision)));
+    if (decision.label !== null && decision.confidence !== null) {
       item.append(document.createTextNode(` ${Math.round(100 * decision.confidence)} %`));
       const meter = element("meter");
       meter.value = decision.confidence;
@@ -364,10 +364,15 @@ function drawFilter() {
   $("filter").value = ["", ...names].includes(chosen) ? chosen : "";
 }
 
-function answerText({ label, confidence, flags }) {
-  const sure = confidence === null ? [] : [`${Math.round(100 * confidence)} %`];
+function labelOf({ label, flags }) {
+  return label ?? (flags.includes("unknown") ? "unknown" : "out of range");
+}
+
+function answerText(answer) {
+  const { label, confidence, flags } = answer;
+  const sure = label === null || confidence === null ? [] : [`${Math.round(100 * confidence)} %`];
   const notes = [...sure, ...flags].join(", ");
-  return (label === null ? "out of range" : label) + (notes ? ` (${notes})` : "");
+  return labelOf(answer) + (notes ? ` (${notes})` : "");
 }
 
 function smallCurve(percent) {

@@ -21,6 +21,7 @@ from edge.commands.calibrate import (
 from edge.commands.options import NOISE_COUNTS
 from edge.skin import file as skinfile
 from edge.skin.decoder import dead_band
+from tests.edge.test_writing import left_by_a_dead_run
 
 
 def test_a_taxel_is_noisy_beyond_the_limit_and_not_at_it():
@@ -49,9 +50,11 @@ def test_the_fakes_rest_values_are_measured_and_the_old_file_is_kept(
     quiet,
     measured,
 ):
+    leftover = left_by_a_dead_run(skin.parent)
     before = skin.read_text()
     status, event, _ = measured(quiet)
     assert status == 0
+    assert not leftover.exists()
     assert event["frames"] == 30
     assert event["kept"] == 0
     assert Path(event["backup"]).read_text() == before
@@ -73,6 +76,7 @@ def test_a_fake_makes_noise_so_that_its_dead_bands_are_rehearsed(
     options,
     deviation,
 ):
+    assert measured(quiet, "--noise", 0)[1]["noise_largest"] == 0.0
     first, repetition = (measured(quiet, *options, frames=90)[1] for _ in range(2))
     assert first == repetition
     file = skinfile.load(skin)
@@ -80,7 +84,6 @@ def test_a_fake_makes_noise_so_that_its_dead_bands_are_rehearsed(
         deviation, rel=0.03
     )
     assert dead_band(file.signal, file.calibration.noise).min() >= 4 * deviation
-    assert measured(quiet, "--noise", 0)[1]["noise_largest"] == 0.0
 
 
 def test_a_skin_that_is_touched_is_refused(skin, make_touch, tmp_path, measured):

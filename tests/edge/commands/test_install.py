@@ -1,12 +1,22 @@
 """A model takes the place of another, and gives it back."""
 
 import shutil
+from contextlib import suppress
+from itertools import count
+from pathlib import Path
 
 import onnx
 import pytest
 
 from edge.commands import install
 from edge.model.model import Model
+from edge.model.verify import golden_of
+from tests.conftest import sealed
+from tests.edge.test_writing import left_by_a_dead_run
+
+
+class Killed(BaseException):
+    """A program ends at once."""
 
 
 @pytest.fixture
@@ -25,7 +35,6 @@ def running(tmp_path):
     folder = tmp_path / "robot"
     folder.mkdir()
     (folder / "model.onnx").write_bytes(b"former model")
-    (folder / "golden.npz").write_bytes(b"former golden")
     return folder / "model.onnx"
 
 
@@ -40,29 +49,106 @@ def test_a_verified_model_takes_the_place_of_the_former_one_which_is_kept(
     new,
     running,
 ):
+    leftover = left_by_a_dead_run(running.parent)
     status, (event,), _ = installed()
     assert status == 0
+    assert not leftover.exists()
     assert event == {"event": "installed", "version": Model(new).version}
     assert running.read_bytes() == new.read_bytes()
     assert running.with_name("model.onnx.former").read_bytes() == b"former model"
-    assert running.with_name("golden.npz.former").read_bytes() == b"former golden"
 
 
-def test_the_former_model_comes_back_once(edge, installed, new, running):
+def test_an_installed_model_is_verified_with_the_golden_file_beside_it(
+    edge, installed, running
+):
+    installed()
+    assert edge("verify", "--model", running)[0] == 0
+
+
+@pytest.fixture
+def old(new, running):
+    """The place of a running model that is as good as the new one."""
     former = onnx.load(new)
     former.doc_string = "former"
-    onnx.save(former, running)
-    former_bytes = running.read_bytes()
+    running.write_bytes(sealed(former))
+    return running.read_bytes()
+
+
+def test_the_former_model_comes_back_and_the_new_one_stays_at_hand(
+    edge, installed, new, old, running
+):
     installed()
-    assert edge("install", "--back", "--to", running)[0] == 0
-    assert running.read_bytes() == former_bytes
-    assert sorted(path.name for path in running.parent.iterdir()) == [
-        "golden.npz",
-        "model.onnx",
-    ]
+    for data in (old, new.read_bytes(), old):
+        assert edge("install", "--back", "--to", running)[0] == 0
+        assert running.read_bytes() == data
+
+
+def test_without_a_former_model_there_is_no_way_back(edge, running):
     status, _, err = edge("install", "--back", "--to", running)
     assert status == 2
     assert "has no former model to go back to" in err
+
+
+@pytest.fixture
+def dies(monkeypatch):
+    """Do something, and die before a step of writing."""
+
+    def run(action, last):
+        steps = count()
+
+        def mortal(function):
+            def step(*words):
+                if next(steps) == last:
+                    raise Killed
+                return function(*words)
+
+            return step
+
+        with monkeypatch.context() as patch, suppress(Killed):
+            patch.setattr(install, "prove", lambda *words: None)
+            patch.setattr(install, "_write", mortal(install._write))
+            patch.setattr(Path, "replace", mortal(Path.replace))
+            action()
+
+    return run
+
+
+@pytest.mark.parametrize("action", ["install", "back"])
+def test_a_kill_at_any_step_loses_no_model_and_mixes_none(
+    edge, installed, new, old, running, dies, action
+):
+    """The model that runs has its golden file, and both models are there."""
+    installed()
+    first = running.read_bytes()
+    third = onnx.load(new)
+    third.doc_string = "third"
+    new.write_bytes(sealed(third))
+    back = ("install", "--back", "--to", running)
+    for step in range(4):
+        running.write_bytes(first)
+        running.with_name("model.onnx.former").write_bytes(old)
+        dies(installed if action == "install" else lambda: edge(*back), step)
+        models = [running.read_bytes()]
+        golden = golden_of(running, Model(running).version)
+        assert golden.is_file() == (models[0] != old)
+        assert edge(*back)[0] == 0
+        models.append(running.read_bytes())
+        assert first in models
+        assert models[0] != models[1]
+        assert edge(*back)[0] == 0
+        assert running.read_bytes() == models[0]
+
+
+def test_golden_files_of_models_that_are_gone_are_removed(installed, new, running):
+    versions = []
+    for name in "abc":
+        model = onnx.load(new)
+        model.doc_string = name
+        new.write_bytes(sealed(model))
+        installed()
+        versions.append(Model(new).version)
+    left = {path.name for path in running.parent.glob("golden-*.npz")}
+    assert left == {f"golden-{version}.npz" for version in versions[1:]}
 
 
 def test_a_model_that_is_installed_twice_is_not_its_own_way_back(installed, running):

@@ -31,7 +31,7 @@ def test_a_person_reads_when_what_was_decided_and_how_sure(terminal, capsys):
     *words, bar, share = mobility.split()[2:]
     assert words == ["mobility", "movable"]
     assert bar == "█" * 10
-    assert 95 <= int(share.removesuffix("%")) < 100
+    assert 95 <= int(share.removesuffix("%")) <= 100
     assert lines[-1].endswith(" 0 missed")
 
 

@@ -8,18 +8,16 @@ import numpy as np
 import pytest
 
 from edge.config import ConfigTable
-from edge.early import is_sure
+from edge.early import fastest, is_fixed, is_sure, stopping_rules
 from edge.errors import InputError
 from edge.model.info import (
-    TEST_SHARE,
-    Novelty,
+    Remoteness,
     Stopping,
     StoppingRule,
-    check_rate,
     margin,
 )
-from edge.model.metadata_reader import read_novelty, read_stopping
-from edge.model.refusal import refusal
+from edge.model.metadata_reader import read_remoteness, read_stopping
+from edge.model.refusal import TEST_SHARE, refusal
 from edge.model.unusual import unusual
 
 
@@ -54,8 +52,8 @@ def stopping(**changes):
 
 
 def test_the_fastest_rule_that_is_certified_is_taken():
-    assert stopping().rule(0.05) is None
-    assert [stopping().rule(error).mean_s for error in (0.1, 0.2, 0.9)] == [
+    assert fastest(stopping(), 0.05) is None
+    assert [fastest(stopping(), error).mean_s for error in (0.1, 0.2, 0.9)] == [
         1.2,
         0.8,
         0.4,
@@ -113,21 +111,28 @@ def test_where_the_full_window_errs_more_often_trials_do_not_help():
     assert "needs about" in refusal(stopping(wrong=0), 0.01)
 
 
+REMOTENESS = Remoteness(
+    limits=(3.0, 4.0),
+    middles=(math.e, 2.0),
+    slopes=(1.0, 5.0),
+    worth={"unknown": 0.46, "sure": 0.09},
+)
+
+
 def table(stored):
     return ConfigTable(asdict(stored), "model.onnx", "stopping.t.")
 
 
 def test_what_is_stored_is_read_again():
     assert read_stopping(table(stopping()), 3) == stopping()
-    novelty = Novelty("t", (0.1, 0.05), ((1.0, 2.0), (3.0, 4.0)))
-    assert read_novelty(table(novelty), 2) == novelty
+    assert read_remoteness(table(REMOTENESS), 2) == REMOTENESS
 
 
 @pytest.mark.parametrize(
     ("changes", "says"),
     [
         ({"slopes": (1.0, 1.0)}, "slopes must be a list of 3 numbers"),
-        ({"slopes": (1.0, -1.0, 1.0)}, "slopes must be a number above 0, not -1.0"),
+        ({"slopes": (1.0, 1e308, 1.0)}, "slopes must be a number from 1e-12 to 1e"),
         (
             {"rules": (StoppingRule(0.1, 1.0, 0.9, 3),)},
             "rules 0: last must be .* 0 to 2, not 3",
@@ -140,31 +145,25 @@ def test_what_contradicts_itself_is_no_stopping(changes, says):
         read_stopping(table(stopping(**changes)), 3)
 
 
-def test_the_limits_of_novelty_are_a_row_for_each_decision_point():
-    novelty = Novelty("t", (0.1, 0.05), ((1.0, 2.0), (3.0,)))
-    with pytest.raises(InputError, match="limits must be a list of 2 numbers, not"):
-        read_novelty(table(novelty), 2)
-    with pytest.raises(
-        InputError, match="limits must be 3 rows of a number for each of the rates"
-    ):
-        read_novelty(table(novelty), 3)
+@pytest.mark.parametrize(
+    ("changes", "says"),
+    [
+        ({"limits": (1.0,)}, "limits must be a list of 2 numbers, not"),
+        ({"slopes": (1.0, -1.0)}, "slopes must be a number of at least 0, not -1.0"),
+        ({"worth": {"sure": 1.5}}, "worth.sure must be a number from 0 to 1, not 1.5"),
+    ],
+)
+def test_damaged_limits_are_refused(changes, says):
+    with pytest.raises(InputError, match=says):
+        read_remoteness(table(replace(REMOTENESS, **changes)), 2)
 
 
-def test_the_farther_a_contact_the_smaller_the_rate_at_which_it_is_unknown():
-    novelty = Novelty("t", (0.2, 0.1, 0.05), ((1.0, 2.0, 3.0),))
-    assert [novelty.rate(0, d) for d in (0.5, 1.0, 1.5, 2.5, 9.0)] == [
-        1.0,
-        1.0,
-        0.2,
-        0.1,
-        0.05,
-    ]
-
-
-@pytest.mark.parametrize("value", [0.0, 1.0, math.nan])
-def test_a_rate_lies_inside_0_to_1(value):
-    with pytest.raises(InputError, match="must be above 0 and below 1"):
-        check_rate(value, "the error rate")
+@pytest.mark.parametrize(
+    ("point", "score", "known"),
+    [(0, 1.0, 1 / (1 + math.exp(-1))), (0, math.e, 0.5), (1, 2.0, 0.5), (0, 0.0, 1.0)],
+)
+def test_the_farther_a_thing_the_less_likely_it_is_known(point, score, known):
+    assert REMOTENESS.known(point, score) == pytest.approx(known)
 
 
 @pytest.mark.parametrize(
@@ -187,16 +186,10 @@ def test_what_is_farthest_from_its_usual_range_is_said(means, phrase):
 def test_only_a_rule_that_no_confidence_meets_waits_for_a_fixed_window(
     confidence, fixed
 ):
-    assert StoppingRule(0.1, 1.0, confidence, 3).fixed is fixed
+    assert is_fixed(StoppingRule(0.1, 1.0, confidence, 3)) is fixed
 
 
-@pytest.mark.parametrize(
-    ("rates", "limits", "says"),
-    [
-        ((0.05, 0.1), (1.0, 2.0), "rates must be numbers between 0 and 1 that fall"),
-        ((0.1, 0.05), (2.0, 1.0), "limits must be rows of numbers from 0 on that rise"),
-    ],
-)
-def test_limits_of_novelty_in_another_order_are_refused(rates, limits, says):
-    with pytest.raises(InputError, match=says):
-        read_novelty(table(Novelty("t", rates, (limits,))), 1)
+@pytest.mark.parametrize("error", [0.0, 1.0, math.nan])
+def test_an_error_rate_lies_inside_0_to_1(error):
+    with pytest.raises(InputError, match="must be above 0 and below 1"):
+        stopping_rules(None, error)

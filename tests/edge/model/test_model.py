@@ -17,6 +17,7 @@ from edge.model.info import FORMAT, METADATA_KEY
 from edge.model.metadata import to_json
 from edge.model.metadata_reader import from_json
 from edge.model.model import Model
+from tests.conftest import sealed
 
 
 @pytest.fixture(scope="module")
@@ -32,10 +33,19 @@ def altered(exported, tmp_path):
         proto = onnx.load(exported / "model.onnx")
         change(proto)
         path = tmp_path / "altered.onnx"
-        path.write_bytes(proto.SerializeToString())
+        path.write_bytes(sealed(proto))
         return path
 
     return write
+
+
+def test_a_byte_that_changed_since_the_export_is_noticed(exported, tmp_path):
+    data = bytearray((exported / "model.onnx").read_bytes())
+    path = tmp_path / "damaged.onnx"
+    for place in np.linspace(0, len(data) - 65, 20).astype(int):
+        path.write_bytes(bytes([*data[:place], data[place] ^ 16, *data[place + 1 :]]))
+        with pytest.raises(InputError, match="changed or damaged since its export"):
+            Model(path)
 
 
 def test_metadata_says_what_the_board_needs(model, forearm):
@@ -170,6 +180,7 @@ REFUSED = {
     meta(
         units={"max_force": "newton"}
     ): "units.contact_area is missing; export it again",
+    meta(speeds=[0.3]): "speeds must be a list of 2 numbers",
     meta(trials=["a"]): "names 1 of 16 trials",
     edited(
         lambda m: m["tasks"]["category"]["labels"].append("liquid")
@@ -177,11 +188,10 @@ REFUSED = {
     edited(
         lambda m: m["tasks"].update(mobility=m["tasks"]["category"])
     ): "no tensor(int64) mobility_label",
-    # Each pair of a rigid or soft category and one of four objects would need a label
-    # of its own.
+    # Three objects would have one pair of labels.
     edited(
         lambda m: m["tasks"]["object"].update(
-            factors={"category": [0, 0, 1, 1], "object": [0, 1, 2, 3]}
+            factors={"category": [0, 0, 1, 1], "mobility": [0, 0, 0, 1]}
         )
     ): "task 'object' is not the product of its factors",
     category(
@@ -190,7 +200,11 @@ REFUSED = {
     category(
         components=10**9
     ): "task 'category' has 1000000000 components of 120 features",
-    meta(tracking={"debounce": 0}): "debounce must be a whole number from 1 to 1000",
+    category(components=0): "components must be a whole number from 1 to",
+    meta(tracking={"debounce": 0}): "debounce must be a whole number from 1 to 100",
+    edited(
+        lambda m: m["skin"].update(counts_per_newton=1e-300)
+    ): "counts_per_newton must be a number from 1e-09 to 1e+09, not 1e-300",
     edited(
         lambda m: m.update(usual={name: [2.0, 1.0] for name in m["features"]})
     ): "usual.max_force must be two numbers that rise, not",

@@ -9,7 +9,12 @@ import pytest
 from edge.chips import block, mpr121
 from edge.fake.clock import VirtualClock
 from edge.fake.player import calibrated, fake_buses, fake_skin, still
-from edge.skin.decoder import NEVER_STUCK, repeat_chance, stuck_limits
+from edge.skin.decoder import (
+    CONVERSION_FRAMES,
+    NEVER_STUCK,
+    repeat_chance,
+    stuck_limits,
+)
 from edge.skin.file import Reading, TaxelCalibration
 from edge.skin.loop import Loop
 from edge.skin.skin import Skin
@@ -95,17 +100,19 @@ def test_a_chip_whose_bytes_never_change_is_stuck_where_it_made_noise_before():
     assert valid == [True] * 150
     with fake_skin(file, lambda t: np.zeros((16, 24), np.uint16)) as skin:
         valid = [bool(skin.read().valid[:4, :3].all()) for _ in range(150)]
-    assert valid.index(False) == file.reading.stuck_frames
+    # The twelve taxels repeat with a chance of 3e-14.
+    assert valid.index(False) == CONVERSION_FRAMES
 
 
 @pytest.mark.parametrize(
-    ("noise", "limit"), [(4.0, 100), (0.8, 100), (0.2, 100), (0.02, NEVER_STUCK)]
+    ("noise", "limit"),
+    [(4.0, 4), (0.5, 20), (0.3, 52), (0.2, 100), (0.1, NEVER_STUCK)],
 )
 def test_equal_readings_prove_a_frozen_chip_only_where_noise_shows_in_counts(
     noise, limit
 ):
-    """At a noise of 0.2 counts a taxel repeats with the chance 0.922: the twelve of an
-    AD7147 do so 100 times in a row with less than 1e-12."""
+    """At a noise of 0.5 counts a taxel repeats with the chance 0.59: the twelve of an
+    AD7147 do so five times in a row with less than 1e-12."""
     assert (stuck_limits(calibrated(CODY, noise)) == limit).all()
 
 

@@ -1,11 +1,13 @@
 """Touches that a run keeps, with their decisions."""
 
+import numpy as np
 import pytest
 
 from edge import demo
 from edge.errors import InputError
 from edge.events import Decided
-from edge.recording import load
+from edge.recording import Recording, load
+from edge.saving import save
 from edge.tools.keep import reasons, reasons_of
 from tests.conftest import decided
 
@@ -22,6 +24,7 @@ def decision(confidence, *flags):
         (decision(None), {"all", "unsure"}),
         (decision(0.95, "unsure"), {"all", "unsure"}),
         (decision(0.95, "unknown"), {"all", "unknown"}),
+        (decision(0.95, "unusual", "tie"), {"all", "unusual"}),
     ],
 )
 def test_a_touch_is_kept_for_what_is_not_sure_of_it(doubted, expected):
@@ -30,7 +33,9 @@ def test_a_touch_is_kept_for_what_is_not_sure_of_it(doubted, expected):
 
 def test_reasons_are_a_list_of_names():
     assert reasons("unsure,all") == ("unsure", "all")
-    with pytest.raises(InputError, match="--keep-if takes unsure, unknown, all"):
+    with pytest.raises(
+        InputError, match="--keep-if takes unsure, unknown, unusual, all"
+    ):
         reasons("never")
 
 
@@ -70,6 +75,33 @@ def test_the_oldest_go_first(edge, tmp_path):
     assert names[0] == "20200101T000001"
     assert len(names) == 3
     assert mine.exists()
+
+
+def after_the_clock_went_back(folder, labels):
+    """A touch that was kept by a later clock, of nearly a megabyte."""
+    frames = np.zeros((1200, 20, 20), np.uint16)
+    recording = Recording(np.arange(1200.0), frames, meta={"labels": labels})
+    path = folder / "kept-n000041-20990101T000000-000000.npz"
+    save(path, recording)
+    return path
+
+
+def test_the_order_of_arrival_counts_and_not_the_clock(edge, tmp_path):
+    later = after_the_clock_went_back(tmp_path, {})
+    assert (
+        "1 recording kept" in run(edge, tmp_path, "--keep-if", "all", "--keep-mb", 1)[2]
+    )
+    (kept,) = tmp_path.glob("kept-*.npz")
+    assert kept.name.startswith("kept-n000042-")
+    assert not later.exists()
+
+
+def test_labelled_touches_are_never_removed_and_a_full_folder_is_said(edge, tmp_path):
+    labelled = after_the_clock_went_back(tmp_path, {"object": "box"})
+    _, _, err = run(edge, tmp_path, "--keep-if", "all", "--keep-mb", 1)
+    assert "0 recordings kept" in err
+    assert "touches are no longer kept, as labelled ones fill the limit" in err
+    assert list(tmp_path.glob("kept-*.npz")) == [labelled]
 
 
 def test_two_runs_in_one_second_keep_two_touches(edge, tmp_path):

@@ -229,7 +229,7 @@ def test_a_trial_that_is_gone_takes_no_former_change_away(folder_page, tmp_path)
     before = (tmp_path / "a.npz").read_bytes()
     act(folder_page, "relabel", **SPONGE)
     (tmp_path / "b.npz").unlink()
-    with pytest.raises(InputError, match="cannot be deleted: No such file"):
+    with pytest.raises(InputError, match="cannot be read: No such file"):
         act(folder_page, "delete", file="b.npz")
     assert "b.npz" in folder_page._trials
     act(folder_page, "undo")

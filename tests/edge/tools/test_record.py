@@ -24,7 +24,7 @@ from edge.saving import save
 from edge.tools import review
 from edge.tools.record import Recorder, Trials, trial_path
 from edge.touch.frame import Frame
-from tests.conftest import ROOT, full_pipe, started
+from tests.conftest import ROOT, full_pipe, in_a_row, started
 
 
 def test_a_label_becomes_a_name_that_every_folder_takes_and_no_listing_hides(tmp_path):
@@ -200,6 +200,21 @@ def test_record_saves_one_trial_a_contact_and_never_overwrites(record, brief, tr
     assert [len(record(*options, n, fake=brief)[1]) for n in (2, 1)] == [2, 1]
     names = sorted(path.name for path in trials.iterdir())
     assert names == [f"foam-a_b_c-00{n}.npz" for n in (1, 2, 3)]
+
+
+def test_record_names_a_broken_taxel_and_leaves_it_out_of_the_trials(
+    record, make_touch, tmp_path
+):
+    touches = in_a_row(*[make_touch(seed=seed) for seed in (0, 1, 3)], rest=150)
+    flickers = 500 * (np.random.default_rng(0).random(len(touches.t)) < 0.5)
+    touches.frames[:, 15, 8] += flickers.astype(np.uint16)
+    save(tmp_path / "flickers.npz", touches)
+    _, events, _ = record(fake=tmp_path / "flickers.npz")
+    (aside,) = (event for event in events if event["event"] == "aside")
+    assert aside["taxels"] == [[15, 8]]
+    files = [event["file"] for event in events if event["event"] == "saved"]
+    trials = [load(file).frames for file in files]
+    assert [trial[:, 15, 8].max() for trial in trials] == [500, 0, 0]
 
 
 def test_record_without_contact_saves_nothing(record, quiet, trials):

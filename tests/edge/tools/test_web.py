@@ -205,12 +205,34 @@ def test_another_host_or_origin_is_refused(server, fields, status):
     assert status in raw(server, head.replace("%d", str(server.server_port)).encode())
 
 
-def test_one_address_has_eight_connections(server):
+def connected(server, count, request=b""):
+    """Connections that have sent a request."""
+    sockets = []
+    for _ in range(count):
+        sockets.append(socket.create_connection(place(server), timeout=PATIENCE_S))
+        sockets[-1].sendall(request)
+    return sockets
+
+
+def test_one_address_has_eight_connections_with_the_token(server):
     with ExitStack() as stack:
-        for _ in range(web.MOST_OF_ONE):
-            stack.enter_context(socket.create_connection(place(server)))
-        ninth = socket.create_connection(place(server), timeout=PATIENCE_S)
+        stream = f"GET /events?token={server.token} HTTP/1.1\r\n\r\n".encode()
+        for browser in connected(server, web.MOST_OF_ONE, stream):
+            stack.enter_context(browser)
+            assert b" 200 " in browser.recv(20)
+        (ninth,) = connected(server, 1)
         assert stack.enter_context(ninth).recv(1) == b""
+
+
+def test_connections_without_the_token_make_room(server):
+    """The oldest is closed, and a browser is served."""
+    with ExitStack() as stack:
+        strangers = connected(server, web.MOST_OF_ONE)
+        for stranger in strangers:
+            stack.enter_context(stranger)
+        request = f"GET /?token={server.token} HTTP/1.1\r\n\r\n".encode()
+        assert b" 200 " in raw(server, request)
+        assert strangers[0].recv(1) == b""
 
 
 @contextmanager

@@ -86,6 +86,14 @@ def test_motion_counts_from_the_reading_that_counts():
     assert contact.series().motion == pytest.approx([0.0, 0.01], abs=1e-16)
 
 
+def test_a_reading_without_contact_replaces_none_of_its_instant():
+    taxels = [(0.0, {(1, 1): 50}), (0.0, {(1, 3): 50}), (0.0, {}), (0.01, {(1, 4): 50})]
+    frames = [pressed(FLAT, t, pressed_taxels) for t, pressed_taxels in taxels]
+    series = followed(FLAT, frames, AT_ONCE).series()
+    assert series.area.tolist() == [1, 1]
+    assert series.motion == pytest.approx([0.0, 0.01], abs=1e-16)
+
+
 def test_motion_on_a_flat_skin_and_its_last_value_after_the_end():
     places = [{(1, 1): 50}, {(1, 2): 50}, {(2, 4): 50}, {}, {}]
     frames = [pressed(FLAT, i * 0.01, taxels) for i, taxels in enumerate(places)]

@@ -1,7 +1,6 @@
 """The choice of settings and of the window."""
 
 from dataclasses import replace
-from itertools import product
 from types import SimpleNamespace
 
 import numpy as np
@@ -10,49 +9,16 @@ import pytest
 import train
 from edge.saving import save
 from edge.statistics import wilson
-from train.choose.candidates import candidates, features_of
 from train.choose.choose import Choosing, decided_together
 from train.choose.evaluate import AnswerTable, Promise
-from train.choose.protocols import GroupsLeftOut, TrialsLeftOut
+from train.choose.protocols import GroupsLeftOut, TrialsLeftOut, rule_among
 from train.choose.settings import Chosen
-from train.data.dataset import Measurement, load_trials
-from train.data.feature_sets import expand
 from train.data.groups import Divisions, Groups
 from train.data.parts import part
 from train.data.vectors import Vectors
 from train.model.pipeline import Choice, ContactClassifier, vote
 
-EARLY = ("contact", "contact joints", "sqrt_joints")
 TWO = ("max_force", "contact_area")
-
-
-def early_settings(make_touch, folder, arm, k):
-    """The settings before the full window, where those of the full window take k
-    neighbours."""
-    for kind, seed in product(("hard", "soft"), range(6)):
-        touch = make_touch(kind=kind, seed=seed, arm=arm, labels={"softness": kind})
-        save(folder / f"{kind}-{seed}.npz", touch)
-    early = [c for c in candidates({}, joints=arm) if c.name in EARLY]
-    dataset = load_trials([folder], Measurement(features_of(early)))
-    y = {"softness": dataset.labels("softness")}
-    choosing = Choosing(dataset, y, early, Divisions.of(dataset, y), samples=40)
-    chosen = {"softness": SimpleNamespace(choice=Choice("IV", 1, k))}
-    return choosing.early(1.2, chosen)
-
-
-def test_decision_points_before_the_full_window_have_settings_where_joints_are_known(
-    make_touch, tmp_path
-):
-    early = early_settings(make_touch, tmp_path, arm=True, k=3)
-    assert early.until_s == 1.2
-    assert early.choices["softness"].features == expand(["contact", "joints"])
-    assert len(early.by_fold) == 10
-    # The number of neighbours is that of the full window, as the graph has one.
-    assert {c["softness"].k for c in (early.choices, *early.by_fold)} == {3}
-
-
-def test_without_joints_they_have_the_settings_of_the_full_window(make_touch, tmp_path):
-    assert early_settings(make_touch, tmp_path, arm=False, k=3) is None
 
 
 @pytest.fixture
@@ -78,7 +44,7 @@ def settled():
         divisions = Divisions(folds, (), objects if grouped else None)
         choosing = Choosing(dataset, {"t": folds.astype(str)}, (), divisions, samples=1)
         by_trial = TrialsLeftOut(trials, {"max_force": 1})
-        by_group = GroupsLeftOut(unseen, {"max_force": 1}, objects)
+        by_group = GroupsLeftOut(unseen, {"max_force": 1}, groups=objects)
         protocol = by_group if grouped else by_trial
         chosen, without = choosing._settle("t", protocol, by_trial)
         return {
@@ -107,6 +73,16 @@ def test_settings_of_groups_are_chosen_by_left_out_groups_also_without_a_fold(se
         "accuracy": 1.0,
         "by trial": 0.0,
     }
+
+
+def test_among_few_trials_the_most_accurate_is_chosen_whatever_its_price():
+    choices = [Choice("IV", count, 1, "pca", features=TWO) for count in (1, 9)]
+    choices[0] = replace(choices[0], features=TWO[:1])
+    right = np.ones((2, 40), dtype=bool)
+    right[0, :2] = right[1, 2] = False
+    widths = dict.fromkeys(TWO, 3)
+    assert rule_among(choices, widths).choose(right) == 0
+    assert rule_among(choices, widths, is_few=True).choose(right) == 1
 
 
 @pytest.fixture(scope="module")
@@ -160,6 +136,25 @@ def test_tasks_that_agree_are_scored_as_they_are_decided_together(agreeing, hits
         assert settings.accuracy.right == hits[task].sum()
         assert settings.by_trial.right == hits[task].sum()
         assert settings.by_fold == (choices,) * 5
+
+
+def test_a_task_with_groups_is_scored_by_single_trials_too(agreeing):
+    vectors, choices, folds = agreeing
+    mobility = replace(vectors, y={"mobility": vectors.y["mobility"]})
+    right = 0
+    for fold in range(5):
+        others = mobility.part(folds != fold)
+        test = mobility.part(folds == fold)
+        model = ContactClassifier.of({"mobility": choices["mobility"]}, others)
+        labels = model.decide(test.X)["mobility"].labels
+        named = model.tasks_["mobility"].classes[labels]
+        right += (named == test.y["mobility"]).sum()
+    none_right = Promise(0, 60, hits=np.zeros(60, dtype=bool))
+    chosen = {"mobility": Chosen(choices["mobility"], none_right, none_right, "object")}
+    alone = {"mobility": choices["mobility"]}
+    plans = {left_out: (folds, [alone] * 5) for left_out in ("trial", "object")}
+    settings = decided_together(chosen, mobility, plans)["mobility"]
+    assert settings.by_trial.right == right
 
 
 def test_a_category_is_right_where_both_of_its_factors_are(hits):
@@ -220,6 +215,39 @@ def test_a_longer_window_has_no_more_decision_points(late):
 def test_touches_that_differ_early_are_told_in_the_usual_window(make_touch, tmp_path):
     early = train.fit(touches(make_touch, tmp_path, 6.0, 0.4), **FEW)
     assert early.window_s == 1.2
+
+
+@pytest.fixture
+def window_of(monkeypatch):
+    """The function that chooses among three windows by forty trials with an onset, of
+    which they have some wrong."""
+    wrong = {1.2: range(8), 2.4: (0, 1), 4.8: (2,)}
+
+    def chosen(onset_s):
+        recording = SimpleNamespace(t=np.arange(3.0))
+        trials = [SimpleNamespace(onset_s=onset_s, recording=recording)] * 40
+        dataset = SimpleNamespace(trials=trials, names=(), widths=lambda samples: ())
+        folds = np.arange(40) % 3
+        divisions = Divisions(folds, (), None)
+        choosing = Choosing(dataset, {"t": folds.astype(str)}, (), divisions, samples=1)
+        answers = {w: {"t": 1.0 - np.isin(np.arange(40), wrong[w])} for w in wrong}
+        monkeypatch.setattr(choosing, "_right", answers.get)
+        return choosing.window(tuple(wrong))
+
+    return chosen
+
+
+def test_what_a_longer_window_gains_is_said_with_its_option(window_of):
+    window_s, (note, gain) = window_of(onset_s=0.5)
+    assert window_s == 2.4
+    assert note.startswith("the window is 2.4 s, as the touches last longer than 1.2 s")
+    assert gain == "--window 4.8: t 98% instead of 95% in cross-validation"
+
+
+def test_the_most_accurate_window_is_taken_where_most_touches_are_late(window_of):
+    window_s, (note,) = window_of(onset_s=0.0)
+    assert window_s == 4.8
+    assert "as most touches begin before their recording" in note
 
 
 @pytest.mark.parametrize(

@@ -13,8 +13,6 @@ from train.choose.evaluate import (
     AnswerTable,
     Promise,
     Result,
-    Rule,
-    averaged,
     chosen,
     chosen_by_fold,
     evaluate,
@@ -158,18 +156,6 @@ def test_the_discriminants_of_two_tasks_may_be_set_side_by_side(most):
     assert_exported(table, 0, vectors, table.folds != 0, table.folds == 0)
 
 
-def test_the_cheapest_within_a_standard_error_of_the_difference_is_chosen():
-    right = np.ones((3, 100), dtype=bool)
-    right[0, :20] = False  # 20 worse than the best, with an error of 4
-    right[1, 20:23] = right[2, 98:] = False  # 1 worse, with an error of 2.2
-    rising = np.arange(3)
-    assert Rule().choose(right) == 2
-    assert Rule(rising).choose(right) == 1
-    assert Rule(np.array([0, 2, 1])).choose(right) == 2
-    assert Rule(rising, margin=0.2).choose(right) == 0
-    assert Rule(rising, allowed=np.array([0, 2])).choose(right) == 2
-
-
 def test_further_divisions_count_in_the_choice_by_all_trials_alone():
     """By the first division the first candidate is better, by both the second."""
     first = np.array([[True, True, True, False], [True, True, False, False]])
@@ -193,27 +179,6 @@ def test_further_divisions_count_in_the_choice_by_all_trials_alone():
     assert chosen(repeated_table, "t") == 1
     assert chosen_by_fold(repeated_table, "t") == [0, 0]
     assert chosen_by_fold(table(first), "t") == [0, 0]
-
-
-def test_the_choice_of_several_windows_is_by_the_mean_of_their_answers():
-    right = np.array([[True, True, True, False], [True, True, False, False]])
-    folds = np.arange(4) % 2
-    settings = {"t": [Choice("IV", 1, 1), Choice("IV", 1, 3)]}
-    tables = [
-        AnswerTable(folds, settings, {"t": np.stack([window] * 2)})
-        for window in (right, ~right)
-    ]
-    mean = averaged([tables[0], tables[0], tables[1]])
-    assert mean.plain("t") == pytest.approx(np.array([[2, 2, 2, 1], [2, 2, 1, 1]]) / 3)
-
-
-def test_of_candidates_that_cost_the_same_the_best_is_chosen():
-    """By how it is better the error of a difference does not ask: nothing is saved by
-    the other."""
-    right = np.ones((4, 100), dtype=bool)
-    right[0, :3] = right[1, 2:4] = right[2, 4:6] = False
-    right[3, 50:] = False
-    assert Rule(np.array([1, 1, 1, 0])).choose(right) == 1
 
 
 def test_folds_spread_each_class_evenly():

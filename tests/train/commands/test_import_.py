@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from edge.recording import load
+from tests.edge.test_writing import left_by_a_dead_run
 from tests.train.importers.test_csv import write_frames
 from train.__main__ import main
 from train.commands.import_ import zeroed
@@ -62,7 +63,9 @@ def test_warnings_that_are_alike_are_counted(make_touch, tmp_path, capsys):
         write_frames(tmp_path / "csv" / name, touch.t, touch.frames + 500)
     (tmp_path / "csv" / "skin.json").write_text('{"threshold_counts": 90}')
     out = tmp_path / "out"
+    leftover = left_by_a_dead_run(out)
     main(["import", "csv", str(tmp_path / "csv"), "--frames", "--out", str(out)])
+    assert not leftover.exists()
     lines = capsys.readouterr().err.splitlines()
     (warning,) = [line for line in lines if "its first frame is above" in line]
     assert warning.startswith(f"train: {out / 'a.npz'}: ")

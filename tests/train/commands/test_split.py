@@ -6,6 +6,7 @@ from edge.recording import load
 from edge.saving import save
 from edge.touch.track import ContactTracker
 from tests.conftest import in_a_row
+from tests.edge.test_writing import left_by_a_dead_run
 from train.__main__ import main
 from train.data.contacts import contacts
 
@@ -45,7 +46,9 @@ def test_each_contact_becomes_a_recording_with_its_own_labels(
     save(
         tmp_path / "in" / "two.npz", replace(two, meta={**two.meta, "contacts": labels})
     )
+    leftover = left_by_a_dead_run(tmp_path / "out")
     assert main(["split", str(tmp_path / "in"), "--out", str(tmp_path / "out")]) == 0
+    assert not leftover.exists()
     unsplit = contacts(two, ContactTracker(two.layout))
     for i, label in enumerate(("one", "other")):
         trial = load(tmp_path / "out" / f"two-{i:02d}.npz")

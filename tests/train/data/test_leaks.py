@@ -39,13 +39,14 @@ REST = np.where(LABELS == "a", 3, 9)[:, None, None, None] * np.ones((1, 6, 2, 5)
 """Frames of ten taxels whose rest values tell the label."""
 
 
-def warnings(frames, labels, onset_s=0.1):
+def warnings(frames, labels, onset_s=0.1, onset=0):
     """The warnings of recordings whose touch begins at some time."""
     trials = []
     for of_trial in frames.astype(np.uint16):
         recording = Recording(np.arange(6) / 10.0, of_trial)
         trials.append(SimpleNamespace(recording=recording, onset_s=onset_s))
-    return leaks(SimpleNamespace(trials=trials), {"kind": labels})
+    dataset = SimpleNamespace(trials=trials, layout=SimpleNamespace(onset=onset))
+    return leaks(dataset, {"kind": labels})
 
 
 def test_labels_told_by_the_first_frame_are_a_warning():
@@ -69,3 +70,9 @@ def test_a_single_label_is_told_by_no_other_trial(count):
 def test_recordings_that_begin_in_contact_are_a_warning():
     (note,) = warnings(REST, LABELS, onset_s=0.0)
     assert "begin with their recording, so their onset is not known; record" in note
+    assert "higher thresholds" in note
+
+
+def test_higher_thresholds_are_advised_only_where_there_are_some():
+    (note,) = warnings(REST, LABELS, onset_s=0.0, onset=200)
+    assert note.endswith("record from before the touch")

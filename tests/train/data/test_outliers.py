@@ -5,8 +5,15 @@ from fractions import Fraction
 from types import SimpleNamespace
 
 import numpy as np
+import pytest
 
-from train.data.outliers import FEWEST_TRIALS, by_features, by_joints, deviations
+from train.data.outliers import (
+    FEWEST_TRIALS,
+    by_features,
+    by_joints,
+    deviations,
+    nearly_constant,
+)
 
 
 def exact(values):
@@ -29,10 +36,14 @@ def test_distances_are_in_deviations_of_the_other_rows():
     np.testing.assert_allclose(deviations(rows), exact(rows.tolist()), rtol=1e-12)
 
 
-def test_where_the_others_are_all_equal_nothing_is_far():
-    rows = np.full((12, 2), 0.1)
-    rows[3] = 7.0
-    assert deviations(rows)[3] == 0.0
+@pytest.mark.parametrize("usual", [0.0, 1.05])
+def test_a_feature_that_hardly_varies_tells_of_no_outlier(usual):
+    """Thirty trials whose values differ by a hundredth of the usual one."""
+    values = np.full((31, 2), usual)
+    values += 0.01 * usual * np.random.default_rng(0).normal(size=values.shape)
+    values[3] += 0.4
+    assert nearly_constant(values)
+    assert not nearly_constant(np.random.default_rng(0).normal(size=(31, 2)))
 
 
 def test_a_trial_that_a_feature_puts_far_outside_is_named(fitted):
@@ -43,6 +54,9 @@ def test_a_trial_that_a_feature_puts_far_outside_is_named(fitted):
     X[5] *= 400.0
     (line,) = by_features(dataset, X, widths)
     assert f"{dataset.trials[5].path}: its max_force lies " in line
+    X[:] = X[0]
+    X[5] *= 400.0
+    assert list(by_features(dataset, X, widths)) == []
 
 
 def test_few_trials_do_not_tell_what_is_usual(fitted):

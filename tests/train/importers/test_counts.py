@@ -122,11 +122,26 @@ def test_values_that_are_all_missing_at_rest_have_no_scale():
 
 @pytest.mark.parametrize(
     ("values", "hint"),
-    [([-1.0], "see --signed, --falls"), ([0.5], "see --falls"), ([7e4], "see --falls")],
+    [
+        ([-1.0], "see --missing, --signed, --falls"),
+        ([0.5], "see --falls"),
+        ([7e4], "see --falls"),
+    ],
 )
 def test_what_is_no_count_is_refused(values, hint):
     with pytest.raises(InputError, match=rf"a.csv: .* are no counts .*; {hint}"):
         recorded(Rest(), trial(values))
+
+
+def test_a_number_that_stands_for_missing_values_is_named_and_may_be_told(capsys):
+    touch = trial([0, 65535], [900, 5], [-1, 7])
+    rest_of([touch, trial([65534, 3])], ValueOptions())
+    assert "1 value of -1 stand alone; if they are missing" in capsys.readouterr().out
+    touch = trial([0, 65535], [900, 5])
+    rest_of([touch], ValueOptions())
+    assert "1 value of 65535 stand alone" in capsys.readouterr().out
+    rest_of([touch], ValueOptions(missing=65535.0))
+    assert touch.missing.tolist() == [[False, True], [False, False]]
 
 
 def test_values_cannot_fall_and_be_signed():

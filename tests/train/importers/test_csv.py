@@ -132,6 +132,40 @@ def test_trials_may_be_numbered_in_an_array(folder):
     }
 
 
+def table(folder, rows, *words):
+    """The frames of a table of commas, flat, and its joint angles."""
+    put(folder, {"cup_1.csv": rows})
+    _, recordings = imported(folder, *words)
+    (trial,) = recordings.values()
+    return trial.frames.reshape(len(trial.t), -1).tolist(), trial.joints
+
+
+def test_a_row_of_numbers_and_empty_cells_is_no_header(folder):
+    rows = "0.00,7,,8,\n0.01,7,9,8,\n0.02,5,6,4,\n"
+    frames, _ = table(folder, rows, "--time", "1", "--taxels", "2-4")
+    assert frames == [[7, 0, 8], [7, 9, 8], [5, 6, 4]]
+
+
+def test_names_in_the_comment_stand_above_texts_too(folder):
+    """As `rostopic echo -p` writes them."""
+    head = "%time,field.header.frame_id,field.data0,field.data1\n"
+    rows = f"{head}1700000000000000000,pad,3,4\n1700000000010000000,pad,5,6\n"
+    assert table(folder, rows)[0] == [[3, 4], [5, 6]]
+
+
+def test_columns_of_one_name_are_taken_as_pandas_tells_them_apart(folder):
+    rows = "time_s,sensor,sensor.1,sensor.2\n0.0,1,2,3\n0.1,4,5,6\n"
+    assert table(folder, rows)[0] == [[1, 2, 3], [4, 5, 6]]
+
+
+def test_joint_angles_in_rows_of_their_own_are_interpolated(folder, capsys):
+    rows = "time_s,s1,s2,q\n0.0,,,0.0\n0.1,1,2,\n0.2,,,0.2\n0.9,3,4,\n"
+    frames, joints = table(folder, rows, "--taxels", "s1,s2", "--joints", "q")
+    assert frames == [[1, 2], [3, 4]]
+    np.testing.assert_allclose(joints, [[0.1], [np.nan]])
+    assert "lacks joint angles for 1 of 2 frames" in capsys.readouterr().out
+
+
 def test_joints_fractions_gaps_and_files_beside(folder):
     rows = [[0.5 * i, "nan", 90, -90] for i in range(3)]
     files = {

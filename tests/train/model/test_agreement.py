@@ -29,5 +29,11 @@ def test_each_label_of_a_product_stands_for_a_pair_and_no_task_is_in_two():
     assert families(TASKS) == [("category", "mobility", "softness")]
 
 
-def test_a_pair_that_was_never_met_makes_no_product():
-    assert factors_of({task: labels[:3] for task, labels in TASKS.items()}) == {}
+def test_a_pair_that_was_never_met_is_no_label():
+    """Nor is there a product where a factor's label is in no pair."""
+    three = {task: labels[:3] for task, labels in TASKS.items()}
+    pairs = {"mobility": (0, 1, 0), "softness": (0, 0, 1)}
+    assert factors_of(three) == {"category": pairs}
+    three["category"] = np.array(["rigid-fixed", "rigid-movable", ""])
+    del three["object"]
+    assert factors_of(three) == {}

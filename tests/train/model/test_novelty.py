@@ -35,8 +35,8 @@ def integers(values):
     return values.astype(np.int64).astype(object)
 
 
-def nearest_by_hand(space, x):
-    """The score of a vector at the first decision point, in integers."""
+def scores_by_hand(space, x):
+    """Novelty and remoteness of a vector at the first decision point, in integers."""
     point = space.points[0]
     most = int(CLIP * 2**STEP_BITS)
     deviations = map(round, ((x - point.mean) * point.gain).tolist())
@@ -44,8 +44,12 @@ def nearest_by_hand(space, x):
     z = shifted(steps @ integers(space.weights), space.shift)
     y = shifted(z @ integers(point.whitening), point.shift)
     outside = max((steps**2).sum() - (z**2).sum(), 1)
-    squares = ((integers(point.rows) - y) ** 2).sum(axis=1)
-    return math.sqrt(outside) * math.sqrt(squares.min()) * point.unit
+    apart = integers(point.rows) - y
+    squares = (apart**2).sum(axis=1)
+    quarters = apart * integers(4.0 * point.weights)
+    remote = min((quarters**2).sum(axis=1).astype(float) / 16.0 * point.nearness)
+    novelty = math.sqrt(outside) * math.sqrt(squares.min()) * point.unit
+    return novelty, math.sqrt(remote)
 
 
 def shifted(totals, shift):
@@ -58,9 +62,10 @@ def test_the_score_is_that_of_integers():
     space = NoveltySpace.of(X, labels, WIDTHS)
     new, _ = trials(20, seed=5)
     new[0, 10:] *= 3.0
-    expected = [nearest_by_hand(space, x) for x in new[0]]
-    assert min(expected) > 0.0
-    assert space.scores(new)[0].tolist() == expected
+    novelty, remoteness = zip(*(scores_by_hand(space, x) for x in new[0]), strict=True)
+    assert min(novelty) > 0.0
+    assert space.scores(new).novelty[0].tolist() == list(novelty)
+    assert space.scores(new).remoteness[0].tolist() == list(remoteness)
 
 
 def test_no_whole_number_reaches_2_to_the_53():
@@ -76,6 +81,9 @@ def test_no_whole_number_reaches_2_to_the_53():
         assert (np.linalg.norm(point.whitening, axis=0) * longest).max() < 2.0**53
         lengths = components * FARTHEST**2 + np.abs(point.rows).max() ** 2 * components
         assert 2.0 * lengths < 2.0**53
+        # In remoteness they are sixteenths.
+        lengths = (point.weights**2).sum() * FARTHEST**2
+        assert 2.0 * lengths * 16.0 < 2.0**53
 
 
 def test_what_is_stored_fits_16_bits():
@@ -87,26 +95,59 @@ def test_what_is_stored_fits_16_bits():
         assert 2**12 < np.abs(point.rows).max() < 2**14
 
 
-def test_a_shift_that_no_label_explains_is_novel():
+def flagged(kind, new):
+    """The shares of usual contacts, and of changed ones (2, m, 30), that lie beyond
+    the limit of a score."""
     X, labels = trials(120)
     space = NoveltySpace.of(X, labels, WIDTHS)
-    limits = limits_of(
-        "t", held_out_scores(X, labels, stratified_folds(labels), WIDTHS)
-    )
+    held_out = held_out_scores(X, labels, stratified_folds(labels), WIDTHS)
+    _, limits = limits_of(getattr(held_out, kind), 0.02)
+    usual, _ = trials(200, seed=9)
+    return [
+        float(np.mean(getattr(space.scores(x), kind)[0] > limits[0]))
+        for x in (usual, new)
+    ]
+
+
+def test_a_shift_that_no_label_explains_is_novel():
     new, _ = trials(200, seed=9)
-    usual = [limits.rate(0, score) <= 0.02 for score in space.scores(new)[0]]
     new[0, :, :5] += 1.0
-    shifted = [limits.rate(0, score) <= 0.02 for score in space.scores(new)[0]]
-    assert np.mean(usual) <= 0.06
-    assert np.mean(shifted) > 0.9
+    usual, shifted = flagged("novelty", new)
+    assert usual <= 0.06
+    assert shifted > 0.9
+
+
+def test_a_thing_between_the_labels_is_remote():
+    """By what tells them apart."""
+    new, _ = trials(200, seed=9)
+    between = 0.5 * (new[:, 0::4] + new[:, 2::4])
+    usual, remote = flagged("remoteness", between)
+    assert usual <= 0.06
+    assert remote > 3.0 * flagged("novelty", between)[1]
+
+
+def test_discriminants_come_first_and_count_whole():
+    X, labels = trials(60)
+    point = NoveltySpace.of(X, labels, WIDTHS).points[0]
+    assert point.weights.tolist() == [1.0] * 3 + [0.25] * 12
+    means = np.stack([point.rows[labels == name].mean(axis=0) for name in "abcd"])
+    spread = np.abs(means - means.mean(axis=0)).max(axis=0)
+    assert spread[3:].max() < 0.01 * spread[0]
+
+
+def test_where_a_label_is_dense_a_contact_is_sooner_remote():
+    X, labels = trials(60)
+    X[:, labels == "a"] = X[:, :1] + 0.1 * (X[:, labels == "a"] - X[:, :1])
+    nearness = NoveltySpace.of(X, labels, WIDTHS).points[0].nearness
+    assert nearness[labels == "a"].min() > 2.0 * np.median(nearness[labels != "a"])
 
 
 def test_units_of_a_feature_do_not_matter():
     X, labels = trials(60)
     new, _ = trials(30, seed=3)
-    scores = NoveltySpace.of(X, labels, WIDTHS).scores(new)
+    scores = NoveltySpace.of(X, labels, WIDTHS).scores(new).novelty
     size = np.repeat([1.0, 2.0**40], WIDTHS)
-    scaled = NoveltySpace.of(X * size, labels, WIDTHS).scores(new * size)
+    scaled = NoveltySpace.of(X * size, labels, WIDTHS).scores(new * size).novelty
     assert scaled == pytest.approx(scores, rel=1e-3)
 
 
@@ -125,7 +166,9 @@ def test_held_out_scores_do_not_depend_on_the_held_out_trials():
     scores = held_out_scores(X, labels, folds, WIDTHS)
     training = folds != 2
     alone = NoveltySpace.of(X[:, training], labels[training], WIDTHS)
-    assert scores[:, ~training].tolist() == alone.scores(X[:, ~training]).tolist()
+    expected = alone.scores(X[:, ~training])
+    assert scores.part(~training).novelty.tolist() == expected.novelty.tolist()
+    assert scores.part(~training).remoteness.tolist() == expected.remoteness.tolist()
 
 
 def test_trials_without_a_fold_have_no_score():
@@ -133,19 +176,17 @@ def test_trials_without_a_fold_have_no_score():
     folds = stratified_folds(labels, 5)
     folds[:4] = -1
     scores = held_out_scores(X, labels, folds, WIDTHS)
-    assert np.isnan(scores[:, :4]).all()
-    assert np.isfinite(scores[:, 4:]).all()
+    assert np.isnan(scores.novelty[:, :4]).all()
+    assert np.isfinite(scores.remoteness[:, 4:]).all()
 
 
-def test_limits_are_quantiles_up_to_a_tenth_and_an_exponential_tail_beyond():
+def test_limits_lie_in_the_exponential_tail_of_the_logarithms():
     scores = np.exp(np.arange(1000.0) / 100.0)[None]
-    limits = limits_of("t", scores)
-    assert limits.rates[0] == 0.5
-    assert limits.limits[0][0] == pytest.approx(math.exp(4.995))
+    typical, limits = limits_of(scores, 0.02)
+    assert typical[0] == pytest.approx(math.exp(4.995))
     tail = np.quantile(np.log(scores), 0.9)
     excess = np.log(scores[np.log(scores) >= tail]).mean() - tail
-    expected = math.exp(tail + excess * math.log(0.1 / 0.02))
-    assert limits.limits[0][limits.rates.index(0.02)] == pytest.approx(expected)
+    assert limits[0] == pytest.approx(math.exp(tail + excess * math.log(0.1 / 0.02)))
 
 
 def test_few_trials_have_few_components():

@@ -1,17 +1,20 @@
 """Learn-then-test: exact limits, walks that stop at the first failure, certificates
 that hold."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.stats import binom
 
-from edge.model.info import TEST_SHARE, StoppingRule
+from edge.model.info import StoppingRule
+from edge.model.refusal import TEST_SHARE
 from train.model.rules import (
     NEVER,
     RISK,
     Course,
+    agreeing,
     certify,
-    following,
     stops,
     upper_limit,
 )
@@ -122,12 +125,37 @@ class TestProduct:
         assert at.tolist() == [0, 0]
         assert wrong.all()
 
+    def agreeing(self, own, *rules):
+        """The rules of the product and of its fast factor, that has one of its own."""
+        known = {"fast": [own, StoppingRule(0.25, 0.3, 0.6, 2)], "slow": []}
+        courses = {
+            "fast": course(self.FAST, self.WRONG),
+            "slow": course(self.SLOW, self.WRONG),
+        }
+        by_task = agreeing(
+            "product", known, {"product": rules, **known}, courses, SECONDS
+        )
+        return by_task["product"], by_task["fast"]
+
     def test_a_factor_follows_its_rules_at_its_own_pace_after_stricter_ones_of_its_own(
         self,
     ):
-        rules = [StoppingRule(0.2, 1.2, NEVER, 2), StoppingRule(0.3, 1.0, 0.7, 2)]
-        of_factor = [StoppingRule(0.1, 0.8, 0.9, 2), StoppingRule(0.25, 0.5, 0.6, 2)]
-        followed = following(of_factor, rules, course(self.FAST, self.WRONG), SECONDS)
-        assert [rule.error for rule in followed] == [0.1, 0.2, 0.3]
-        assert [rule.mean_s for rule in followed] == [0.8, 1.2, 0.4]
-        assert followed[2].confidence == rules[1].confidence
+        sure = StoppingRule(0.3, 1.0, 0.7, 2)
+        own = StoppingRule(0.1, 1.2, NEVER, 2)
+        window = StoppingRule(0.2, 1.2, NEVER, 2)
+        product, factor = self.agreeing(own, window, sure)
+        assert product == [window, sure]
+        assert factor == [own, window, replace(sure, mean_s=0.4)]
+
+    def test_a_factor_is_never_slower_at_a_looser_error(self):
+        """The product waits for a fixed window until its rule is as fast."""
+        own = StoppingRule(0.1, 0.4, 0.8, 2)
+        window = StoppingRule(0.2, 1.2, NEVER, 2)
+        slow = StoppingRule(0.3, 1.2, 0.95, 2)
+        fast = StoppingRule(0.4, 1.0, 0.7, 2)
+        product, factor = self.agreeing(own, window, slow, fast)
+        assert product == [window, fast]
+        assert factor == [own, replace(fast, mean_s=0.4)]
+        product, factor = self.agreeing(own, replace(slow, error=0.2))
+        assert product == [window]
+        assert factor == [own]

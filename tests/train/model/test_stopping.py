@@ -5,15 +5,14 @@ import numpy as np
 import pytest
 from scipy.special import logit
 
+from edge.early import fastest
 from edge.errors import InputError
-from edge.model.info import NOVELTY_RATE
 from train.data.folds import stratified_folds
 from train.model.held_out import answers
 from train.model.pipeline import Choice
 from train.model.stopping import (
     SequentialClassifier,
     excess_of,
-    unlike,
 )
 
 SECONDS = np.array([0.4, 0.8, 1.2])
@@ -48,7 +47,7 @@ def touches(n, seed=0):
 def test_what_is_plain_from_the_second_decision_point_on_is_decided_there():
     X, labels = touches(120)
     model = calibrated(of_neighbours(3), X, {"t": labels})
-    assert model.stopping_["t"].rule(0.1).mean_s <= 0.83
+    assert fastest(model.stopping_["t"], 0.1).mean_s <= 0.83
     new, truth = touches(300, seed=1)
     named, _ = answers(model.decision_points_, new)["t"]
     assert (named[1:] == truth).all()
@@ -58,12 +57,44 @@ def test_rules_ask_for_the_same_margin_at_every_decision_point():
     X, labels = touches(60)
     model = calibrated(of_neighbours(3), X, {"t": labels})
     _, margins = answers(model.decision_points_, X)["t"]
-    excess = excess_of(model.novelty_, model.space_.scores(X))
+    excess = excess_of(model.novelty_, model.space_.scores(X).novelty)
     *_, courses = model.judged(X, {"t": labels})
     log_odds = logit(courses["t"].confidences[0])
     stopping = model.stopping_["t"]
     expected = stopping.slope * margins + stopping.intercept - stopping.doubt * excess
     assert log_odds == pytest.approx(expected)
+
+
+def test_the_full_window_has_a_curve_of_its_own():
+    """Early answers are right by chance, those of the full window always."""
+    X, labels = touches(60)
+    X[1] = X[0]
+    things = np.char.add(labels, (np.arange(60) % 3).astype(str))
+    choices = {**of_neighbours(3), "thing": Choice("none", 3, 3)}
+    model = calibrated(choices, X, {"t": labels, "thing": things})
+    stopping = model.stopping_["t"]
+    assert stopping.slopes[:2] == (stopping.slope,) * 2
+    assert stopping.intercepts[:2] == (stopping.intercept,) * 2
+    assert stopping.slopes[2] != stopping.slope
+    assert stopping.intercepts[2] > stopping.intercept
+
+
+def test_answers_to_groups_that_were_not_met_lower_the_confidence_at_the_full_window():
+    """Where a sixth of the things is left out, its trials are called wrongly."""
+    X, labels = touches(120)
+    things = np.arange(120) % 6
+    X[:, things == 3, 0] = np.where(labels[things == 3] == "a", 0.0, 30.0)
+    X[:, things == 3, 1] += 300.0
+    choices = {**of_neighbours(3), "thing": Choice("none", 3, 3)}
+    y = {"t": labels, "thing": things.astype(str)}
+    calibration = X, y, stratified_folds(labels), [choices] * 10
+    model = SequentialClassifier(choices, SECONDS, ("max_force",))
+    known = model.fit(*calibration).stopping_["t"]
+    with_others = model.fit(*calibration, ["t"]).stopping_["t"]
+    assert model.right_["t"][-1].all()
+    assert with_others.intercepts[:2] == known.intercepts[:2]
+    assert with_others.intercepts[2] < known.intercepts[2]
+    assert with_others.rules == known.rules
 
 
 def test_each_fold_is_answered_by_what_was_chosen_without_it():
@@ -81,30 +112,22 @@ def test_each_fold_is_answered_by_what_was_chosen_without_it():
 def test_a_held_out_trial_is_never_its_own_neighbour():
     X, labels = touches(60)
     model = calibrated(of_neighbours(1), X, {"t": labels})
-    assert (np.array(model.novelty_.limits) > 0.0).all()
-    assert (model.space_.scores(X) == 0.0).all()
+    assert min(*model.novelty_.limits, *model.remoteness_.limits) > 0.0
+    assert (model.space_.scores(X).novelty == 0.0).all()
 
 
-def test_a_touch_unlike_all_others_is_an_error_of_the_task_that_then_names_nothing():
+def test_an_unknown_thing_is_an_error_of_the_task_that_then_names_nothing():
     X, labels = touches(200)
     things = np.char.add(labels, np.where(X[1, :, 1] > 0, "+", "-"))
     choices = {"kind": Choice("none", 12, 1), "thing": Choice("none", 12, 1)}
     model = calibrated(choices, X, {"kind": labels, "thing": things})
-    assert model.novelty_.task == "thing"
+    assert model.stopping_["thing"].remoteness is not None
+    assert model.stopping_["kind"].remoteness is None
     unknown = model.unknown_[-1]
     right = {task: answers[-1] for task, answers in model.right_.items()}
     assert 0 < (unknown & right["thing"]).sum() < 10
     assert model.stopping_["kind"].wrong == int((~right["kind"]).sum())
     assert model.stopping_["thing"].wrong == int((~right["thing"] | unknown).sum())
-
-
-def test_a_touch_is_unknown_beyond_the_limit_of_its_decision_point():
-    X, labels = touches(60)
-    novelty = calibrated(of_neighbours(1), X, {"t": labels}).novelty_
-    distances = np.array([row[-2] for row in novelty.limits])[:, None] + [0.0, 1e-9]
-    assert novelty.rates[-2] == NOVELTY_RATE
-    assert unlike(novelty, distances).tolist() == [[False, True]] * 3
-    assert novelty.rate(1, float(distances[1, 1])) <= NOVELTY_RATE
 
 
 def test_what_no_task_takes_is_there_for_the_folds_alone():
@@ -120,7 +143,7 @@ def test_what_no_task_takes_is_there_for_the_folds_alone():
     assert model.columns_.tolist() == list(range(6, 12))
     assert model.n_features_in_ == 6
     assert model.right_["t"][-1].all()
-    assert (model.space_.scores(X[..., model.columns_]) == 0.0).all()
+    assert (model.space_.scores(X[..., model.columns_]).novelty == 0.0).all()
 
 
 def test_too_few_trials_are_refused():
@@ -129,3 +152,14 @@ def test_too_few_trials_are_refused():
         InputError, match="calibration needs at least 20 trials, not 19"
     ):
         calibrated(of_neighbours(1), X, {"t": labels})
+
+
+def test_a_kind_is_no_name_though_it_has_more_labels():
+    X, labels = touches(60)
+    moves = np.where(np.arange(60) % 2, "fixed", "movable")
+    y = {"kind": np.char.add(labels, moves), "soft": labels, "moves": moves}
+    y["thing"] = np.where(np.arange(60) < 30, "cup", "box")
+    choices = dict.fromkeys(y, Choice("none", 3, 1))
+    stopping = calibrated(choices, X, y).stopping_
+    named = [task for task, of_task in stopping.items() if of_task.remoteness]
+    assert named == ["thing"]

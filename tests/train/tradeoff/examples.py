@@ -9,6 +9,7 @@ from train.choose.evaluate import Promise
 from train.choose.settings import Chosen
 from train.model.pipeline import Choice
 from train.tradeoff.commands import Commands
+from train.tradeoff.early import Certified
 from train.tradeoff.measured import Measured
 
 
@@ -22,6 +23,14 @@ def chosen(right, unseen=None, of=100):
     left_out = "trial" if unseen is None else "object"
     accuracy = result(right if unseen is None else unseen)
     return Chosen(Choice("IV", 1, 1), accuracy, result(right), left_out)
+
+
+def rule(error=0.1, right=95, mean_s=0.5):
+    """Early decisions of 100 contacts, so many of them right, half of them 0.1 s after
+    the mean."""
+    hits = np.arange(100) < right
+    seconds = mean_s + np.where(np.arange(100) % 2, 0.1, -0.1)
+    return Certified(error, hits, hits, 0.0, 1.0, seconds)
 
 
 def measured(points, certified, **changes):

@@ -5,7 +5,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from tests.train.tradeoff.examples import chosen
+from tests.train.tradeoff.examples import chosen, rule
 from train.tradeoff import shear
 from train.tradeoff.shear import KNOWN, UNSEEN, Answers, Compared
 from train.tradeoff.wires import microcontroller, waited_s
@@ -19,7 +19,7 @@ def answers(shares, unseen=None, early=()):
         points[round(0.2 * (i + 1), 1)] = {
             "mobility": chosen(share, share_unseen, of=10)
         }
-    rules = [SimpleNamespace(mean_s=s, wrong=wrong) for s, wrong in early]
+    rules = [rule(right=right, mean_s=seconds) for seconds, right in early]
     of_known = {"mobility": SimpleNamespace(certified=rules)}
     return Answers(points, {KNOWN: of_known, UNSEEN: {}})
 
@@ -38,9 +38,9 @@ def test_unseen_objects_have_times_of_their_own():
 
 
 def test_early_decisions_have_the_shortest_mean_time_that_is_right_enough():
-    shear_answers = answers([9], early=[(0.3, 0.25), (0.5, 0.1), (0.8, 0.05)])
-    assert shear_answers.early_s("mobility", KNOWN, 0.9) == 0.5
-    assert shear_answers.early_s("mobility", KNOWN, 0.95) == 0.8
+    shear_answers = answers([9], early=[(0.3, 75), (0.5, 90), (0.8, 95)])
+    assert shear_answers.early_s("mobility", KNOWN, 0.9) == pytest.approx(0.5)
+    assert shear_answers.early_s("mobility", KNOWN, 0.95) == pytest.approx(0.8)
     assert shear_answers.early_s("mobility", KNOWN, 0.99) is None
     assert shear_answers.early_s("mobility", UNSEEN, 0.9) is None
 
@@ -56,7 +56,7 @@ def test_gains_are_paired_differences():
 
 
 def test_times_say_never_with_a_dash():
-    pair = Compared(answers([9], early=[(0.1, 0.0)]), answers([7]))
+    pair = Compared(answers([9], early=[(0.1, 100)]), answers([7]))
     rows = {(row["right"], row["decision"]): row for row in shear.times(pair)}
     fixed = rows["90%", "fixed, known objects"]
     assert fixed["without s"] == "-"

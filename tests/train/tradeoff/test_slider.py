@@ -1,39 +1,27 @@
 """The first screen: the accuracy after each time, without and with a script."""
 
+import html
 from contextlib import contextmanager
-from types import SimpleNamespace
 
 import pytest
 
 from tests.browser import chromium
-from tests.train.tradeoff.examples import chosen, measured
-from train.choose.evaluate import Promise
+from tests.train.tradeoff.examples import chosen, measured, rule
 from train.report.page import write
 from train.report.section import Section
 from train.tradeoff.front import ParetoFront
-from train.tradeoff.slider import reached, slider
+from train.tradeoff.slider import fronts, reached, slider
 
 ANSWERS = {
     0.4: {"mobility": chosen(60, 73), "<b>": chosen(50)},
     1.0: {"mobility": chosen(97, 73), "<b>": chosen(80)},
     1.2: {"mobility": chosen(99, 73), "<b>": chosen(91)},
 }
-RULE = SimpleNamespace(
-    error=0.1,
-    folds=5,
-    mean_s=0.5,
-    wrong=0.05,
-    result=Promise(95, 100),
-)
 MEASURED = measured(
     ANSWERS,
-    {"mobility": [RULE], "<b>": []},
-    costs=[
-        {"change": "96 taxels", "mobility, points": "-3 (-6 to +1)"},
-        {"change": "70 of 140 trials", "mobility, points": "-9 (-15 to -3)"},
-    ],
-    board=SimpleNamespace(arithmetic_s=0.002, name="a board"),
+    {"mobility": [rule()], "<b>": []},
 )
+EARLY = "make export DATA=mine EXPORT='--leave-out trial --decision-points"
 
 
 def page():
@@ -45,27 +33,39 @@ def test_the_interval_is_that_which_the_front_promises():
     assert f"({100 * point.low:.0f} to {100 * point.high:.0f})" in page()
 
 
-def test_the_time_of_an_accuracy_is_told_early_and_fixed():
-    text = page()
-    assert "mobility after 0.50 s on average (early), 1 s (fixed)" in text
-    assert "&lt;b&gt; after 1.2 s (fixed)" in text
+def test_the_time_of_an_accuracy_is_told_early_and_fixed_with_its_commands():
+    """Ninety-five of 100 contacts, whose times have a deviation of 0.1 s: the upper end
+    is 1.96 times 0.1 s, over 10, times the root of 2.5."""
+    early, fixed, other, _ = html.unescape(reached(MEASURED, 0.9)).split("</tr>")
+    assert "after 0.50 s on average (at most 0.53), early: 95 % (83 to 99)" in early
+    assert f"<code>{EARLY} 0.2:1.2:0.1'</code>, then " in early
+    assert (
+        "<code>edge-classify run --model build/model.onnx --error 0.1</code>" in early
+    )
+    assert "<td>mobility</td><td>after 1 s, fixed: 97 % (86 to 99)</td>" in fixed
+    assert "<code>make export DATA=mine EXPORT='--window 1'</code>" in fixed
+    assert "<td><b></td><td>after 1.2 s, fixed: 91 % (78 to 97)</td>" in other
 
 
 def test_a_task_that_never_is_so_right_is_told():
-    assert reached(MEASURED, 0.97).endswith("<b> never")
+    assert reached(MEASURED, 0.97).endswith(
+        "<td>&lt;b&gt;</td><td>never</td><td></td></tr>"
+    )
+    assert reached(MEASURED, 0.97).count("<tr>") == 2
 
 
-def test_the_names_of_the_front_and_the_other_prices_have_a_line_each():
+def test_the_names_of_the_front_have_their_task_and_interval():
     text = page()
     for name, share in (("fast", "60 %"), ("balanced", "60 %"), ("accurate", "99 %")):
-        assert f"<td>{name}</td><td>{share} after" in text
+        assert f"<td>{name}</td><td>mobility: {share} (" in text
         assert f"make export DATA=mine FRONT={name}" in text
-    assert (
-        "<li>Fewer taxels: 96 taxels gain mobility -3 (-6 to +1) points.</li>" in text
-    )
-    assert "<li>Fewer recordings: 70 of 140 trials gain mobility -9" in text
-    assert "<li>Arithmetic: 2.0 ms a decision on a board.</li>" in text
-    assert "mobility is cheapest early, at most 10% wrong.</li>" in text
+
+
+def test_the_cheapest_use_has_its_accuracy_prices_and_commands():
+    *_, row = html.unescape(fronts(MEASURED)).split("<tr>")
+    words = "95 % (83 to 99) after 0.50 s, where a wrong decision costs 10 and a second"
+    assert row.startswith(f"<td>cheapest</td><td>mobility: {words} of waiting 1</td>")
+    assert f"<code>{EARLY} 0.2:1.2:0.1'</code>, then <code>edge-classify run" in row
 
 
 def test_without_a_script_the_lines_show_the_accuracy_after_a_second():
@@ -108,6 +108,7 @@ def test_in_a_browser_the_other_slider_moves_the_accuracy(tmp_path):
             "return [...document.querySelectorAll('input')]"
             ".map(input => input.getAttribute('aria-valuetext'))"
         )
-    assert "60 % right: mobility after 0.50 s on average (early), 0.4 s" in text
-    assert spoken[0].startswith("60 % right: mobility after")
+    assert "60 % right" in text
+    assert "after 0.50 s on average (at most 0.53), early" in text
+    assert spoken[0].startswith("60 % right: mobility after 0.50 s on average")
     assert spoken[1] == "1 seconds: mobility 97 %, <b> 80 %"

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from edge.errors import InputError
-from edge.model.info import StoppingRule
+from edge.model.info import Stopping, StoppingRule
 from edge.model.model import Model
 from edge.recording import load
 from edge.saving import save
@@ -21,13 +21,13 @@ from edge.touch.layout import SkinLayout
 from export.__main__ import main
 from tests import browser
 from tests.conftest import export, rows_of, save_touches
-from tests.train.tradeoff.examples import chosen, measured
+from tests.train.tradeoff.examples import chosen, measured, rule
 from train.commands.tradeoff import cost
 from train.data.dataset import Recordings, read
 from train.data.parts import part
-from train.model.rules import Course
+from train.model.rules import NEVER, Course
 from train.report.work import Workers
-from train.tradeoff import answer, board, choices, costs, early, uses
+from train.tradeoff import answer, board, choices, costs, early
 from train.tradeoff import run as running
 from train.tradeoff.breakaway import breakaway_times
 from train.tradeoff.choices import chosen as make_choice
@@ -89,17 +89,20 @@ def test_the_front_has_the_windows_that_no_other_beats_in_both():
     assert (best[0].low, best[0].high) == wilson(20, 40)
 
 
-def test_a_window_on_a_flat_part_of_the_curve_is_left_out(monkeypatch):
-    """Ninety trials more at 1 s than at 0.8 s, and one more at 1.2 s."""
-    right = {0.8: 5, 0.9: 50, 1.0: 95, 1.1: 95, 1.2: 96}
+def test_windows_are_measured_where_the_curve_is_steep(monkeypatch):
+    """Ninety trials more at 1 s than at 0.8 s, and no more than one before and after."""
+    right = {0.2: 4, 0.4: 4, 0.6: 5, 0.8: 5, 0.9: 50, 1.0: 95, 1.1: 95, 1.2: 96}
+    made = []
 
     def choice(dataset, window_s, quick):
+        made.append(window_s)
         return {"t": chosen(right[window_s])}
 
     monkeypatch.setattr(choices, "chosen", choice)
     workers = Workers(progress=False)
     points = choices.choices_at(None, list(right), "t", workers, quick=True)
-    assert list(points) == [0.8, 0.9, 1.0, 1.2]
+    assert list(points) == [0.2, 0.6, 0.8, 0.9, 1.0, 1.2]
+    assert made == [0.2, 0.6, 1.2, 0.9, 0.8, 1.0]
 
 
 def test_unseen_objects_have_a_figure_only_where_they_were_left_out():
@@ -242,21 +245,20 @@ def test_the_dearer_an_error_the_longer_it_pays_to_wait():
 
 
 def test_the_cheapest_use_may_be_early_and_its_price_has_an_interval():
-    right = np.arange(100) < 94
-    rule = early.Certified(0.1, early.FOLDS, right, right, 0.0, 1.0, 0.6)
+    decisions = rule(right=94, mean_s=0.6)
     early_or_late = measured(
         {1.2: {"t": chosen(95)}},
-        {"t": [rule]},
+        {"t": [decisions]},
         wrong=10.0,
         second=1.0,
     )
     (row,) = answer.prices(early_or_late).tables[0].rows
     assert row["best use"] == "early, at most 10% wrong"
     assert row["mean price"] == 1.2  # 10 times 6 %, and 0.6 s
-    low, high = rule.result.interval
+    low, high = decisions.result.interval
     ends = [round(10.0 * (1.0 - share) + 0.6, 2) for share in (high, low)]
     assert row["95 % interval"] == f"{ends[0]:g} to {ends[1]:g}"
-    assert "edge-classify run --error 0.1" in row["command"]
+    assert "run --model build/model.onnx --error 0.1" in row["command"]
 
 
 def comparison(right, seconds=(0.2, 0.6, 1.0)):
@@ -278,44 +280,37 @@ class TestEarly:
             compared = comparison(share_right(share, share, share))
             assert compared.calibration_error == pytest.approx(error)
 
-    def test_a_rule_that_serves_two_error_rates_is_listed_once(self):
-        compared = comparison(share_right(0.5, 0.7, 0.9))
-        right = np.arange(100) < 90
-        rule = early.Certified(0.1, early.FOLDS, right, right, 0.0, 1.0, 0.6)
-        bolder = replace(rule, error=0.3, right=np.arange(100) < 70, mean_s=0.4)
-        compared.certified.extend([rule, replace(rule, error=0.2), bolder])
-        listed = [rule.error for rule in uses.distinct(compared)]
-        assert listed == [0.1, 0.3]
-
-    def test_an_early_decision_is_judged_on_the_contacts_of_the_folds_that_certified_it(
+    def test_early_decisions_follow_the_rules_that_the_model_of_all_contacts_certifies(
         self,
     ):
-        rule = StoppingRule(0.1, 0.0, 0.5, 1)
+        """Two points: the first wrong about one of four contacts, and the second unlike
+        all others for another."""
         wrong = np.array([[True, False, False, False], [False] * 4])
         unknown = np.array([[False] * 4, [True, False, False, False]])
-        course = Course([np.full((2, 4), 0.5)], [wrong], unknown, withheld=True)
-        decisions = early._certified(0.1, [(course, rule)], (0.6, 1.2))
-        assert decisions.folds == 1
-        assert decisions.result.right == 3
-        assert decisions.result.total == 4
+        course = Course([np.full((2, 4), 0.5)], [wrong], unknown, withheld=unknown)
+        rules = StoppingRule(0.12, 1.2, NEVER, 1), StoppingRule(0.2, 0.6, 0.5, 1)
+        stopping = Stopping((), (), (), 0.0, 0.0, 0.0, rules, 4, 0, 0.1)
+        late, soon = early._certified(course, stopping, (0.6, 1.2))
+        # The rates 0.05 and 0.1 are refused; one rule serves 0.2 to 0.3.
+        assert (late.error, soon.error) == (0.15, 0.2)
+        assert (late.mean_s, soon.mean_s) == (1.2, 0.6)
+        assert (late.early, soon.early) == (0.0, 1.0)
+        assert (late.unknown, soon.unknown) == (0.25, 0.0)
         # At the full window one more is right and one names nothing.
-        assert decisions.gain[0] == 0.0
-        assert decisions.mean_s == 0.6
-        assert decisions.early == 1.0
-        assert decisions.unknown == 0.0
+        assert soon.result.right == late.result.right == 3
+        assert soon.gain[0] == 0.0
 
     @pytest.mark.slow
     def test_clear_contacts_are_decided_at_the_first_decision_point(self, tmp_path):
         dataset = followed(read([save_touches(tmp_path, 20)]))
-        compared = early.compare_stopping(dataset, (0.6, 1.2))["category"]
+        compared = early.compare_stopping(dataset, (0.6, 1.2), certify=True)
+        compared = compared["category"]
         assert compared.right.all()
-        rules = {rule.error: rule for rule in compared.certified}
-        rule = rules[0.15]
-        assert rule.folds == early.FOLDS
-        assert rule.wrong == 0.0
-        assert rule.mean_s == 0.6
         # Forty trials certify no rate as low as the smallest one.
-        assert min(rules) > early.ERRORS[0]
+        (decisions,) = compared.certified
+        assert decisions.error > early.ERRORS[0]
+        assert decisions.wrong == 0.0
+        assert decisions.mean_s == pytest.approx(0.6)
 
     def test_unseen_objects_are_decided_by_models_that_never_met_them(
         self,
@@ -419,6 +414,12 @@ class Written:
         return self.report.read_text()
 
 
+def quickly(change, like, answered=costs.answered):
+    """A change with a quick choice, even where that among all candidates is asked
+    for."""
+    return answered(replace(change, options={}), like)
+
+
 @pytest.fixture(scope="module")
 def written(tmp_path_factory):
     """The report on 28 touches, with few windows and changes."""
@@ -432,6 +433,7 @@ def written(tmp_path_factory):
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(running, "FEWEST", 28)
         patch.setattr(early, "FOLDS", 4)
+        patch.setattr(costs, "answered", quickly)
         patch.setattr(costs, "PARTS", (1,))
         patch.setattr(running, "WINDOWS_S", (0.4, 1.2))
         patch.setattr(choices, "CHOSEN_S", (0.4, 1.2))

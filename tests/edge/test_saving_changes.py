@@ -1,0 +1,150 @@
+"""Changes of a folder's recordings: by one program at a time, whole or not at all."""
+
+import shutil
+from itertools import count
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from edge import saving
+from edge.errors import InputError
+from edge.recording import Recording, load
+from edge.saving import JOURNAL, alone, change_all, find, save, take_back
+
+
+class Killed(BaseException):
+    """A program ends at once."""
+
+
+@pytest.fixture
+def new_days(tmp_path):
+    """A function that makes two folders of two recordings each."""
+    numbers = count()
+
+    def make():
+        root = tmp_path / str(next(numbers))
+        places = [root / day for day in ("monday", "tuesday")]
+        still = np.zeros((2, 2, 2), np.uint16)
+        for path in [place / f"{name}.npz" for place in places for name in "ab"]:
+            meta = {"labels": {"object": "box"} if path.stem == "b" else {}}
+            save(path, Recording(np.array([0.0, 0.1]), still, meta=meta), lasting=False)
+        return places
+
+    return make
+
+
+def state(days):
+    """{day, name: labels} of the recordings that are there, after a look at the last
+    day first."""
+    paths = find(map(str, reversed(days)))
+    return {path.parts[-2:]: load(path).labels for path in paths}
+
+
+def relabel(days):
+    with alone(days):
+        change_all({path: {"object": "cup"} for path in find(map(str, days))})
+
+
+def delete(days):
+    with alone(days):
+        change_all({place / "a.npz": None for place in days})
+
+
+def undo(days):
+    with alone(days):
+        take_back(days)
+
+
+@pytest.fixture
+def dies(monkeypatch):
+    """Do something with folders, and die at a step; whether it died."""
+
+    def run(action, days, last):
+        steps = count()
+
+        def mortal(function):
+            def step(*words, **options):
+                if next(steps) == last:
+                    raise Killed
+                return function(*words, **options)
+
+            return step
+
+        with monkeypatch.context() as patch:
+            for name in ("save", "write_whole"):
+                patch.setattr(saving, name, mortal(getattr(saving, name)))
+            patch.setattr(shutil, "rmtree", mortal(shutil.rmtree))
+            for name in ("mkdir", "rename", "replace", "unlink"):
+                patch.setattr(Path, name, mortal(getattr(Path, name)))
+            try:
+                action(days)
+            except Killed:
+                return True
+            return False
+
+    return run
+
+
+@pytest.mark.parametrize(
+    "actions", [[relabel], [delete], [relabel, undo], [delete, undo]]
+)
+def test_a_change_that_is_killed_at_any_step_is_whole_or_has_not_been(
+    actions, new_days, dies
+):
+    *former, action = actions
+    states = []
+    for step in count():
+        days = new_days()
+        for change in former:
+            change(days)
+        before = state(days)
+        died = dies(action, days, step)
+        states.append(state(days))
+        if not died:
+            break
+    assert before != states[-1]
+    assert all(labels in (before, states[-1]) for labels in states)
+    assert states.count(before) > 1
+    assert states.count(states[-1]) > 1
+
+
+def test_a_change_that_was_finished_later_can_be_taken_back(new_days, dies, caplog):
+    days = new_days()
+    assert dies(relabel, days, 9)
+    assert {labels["object"] for labels in state(days).values()} == {"cup"}
+    assert (
+        "finished a change of labels that was interrupted; recordings: " in caplog.text
+    )
+    undo(days)
+    assert {len(labels) for labels in state(days).values()} == {0, 1}
+    assert list(days[0].parent.rglob(".*")) == []
+
+
+@pytest.mark.parametrize("words", [["--set", "object=cup", "--yes"], ["--undo"]])
+def test_two_programs_do_not_change_one_folder(new_days, words, refused, monkeypatch):
+    monkeypatch.setattr(saving, "LOOKS", 1)
+    day, _ = new_days()
+    with alone([day]):
+        assert "another program is changing labels here" in refused(
+            "label", day, *words
+        )
+    assert load(day / "a.npz").labels == {}
+
+
+def test_a_folder_may_be_named_in_two_ways(new_days, monkeypatch):
+    monkeypatch.setattr(saving, "LOOKS", 1)
+    day, _ = new_days()
+    with alone([day, day / ".." / day.name]):
+        assert find([str(day)])
+
+
+def test_a_reader_waits_for_a_change_that_is_under_way(new_days, monkeypatch):
+    monkeypatch.setattr(saving, "LOOKS", 1)
+    day, _ = new_days()
+    with alone([day]):
+        find([str(day)])
+        (day / JOURNAL).write_text("half")
+        with pytest.raises(InputError, match="another program is changing labels"):
+            find([str(day)])
+        (day / JOURNAL).unlink()

@@ -1,0 +1,138 @@
+"""Settings before the full window: which trials are decided when sure, and how the
+errors of these choose."""
+
+from itertools import product
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from edge.saving import save
+from train.choose.candidates import candidates, features_of
+from train.choose.choose import Choosing
+from train.choose.early import SHARES, SureDecisions, early_options, settle_early
+from train.data.dataset import Measurement, load_trials
+from train.data.feature_sets import expand
+from train.data.groups import Divisions
+from train.data.vectors import Vectors
+from train.model.held_out import HeldOut
+from train.model.pipeline import Choice
+
+SECONDS = np.array([0.4, 0.8, 1.2])
+
+
+class TestSureDecisions:
+    """Of two trials, one is sure from the first decision point on, the other at the
+    last."""
+
+    MARGINS = np.array([[5.0, 1.0], [5.0, 2.0], [5.0, 9.0]])
+    RIGHT = np.array([[True, False], [True, False], [True, True]])
+
+    def decisions(self, *parts):
+        right = {"a": self.RIGHT, "b": ~self.RIGHT}
+        margins = {"a": self.MARGINS, "b": self.MARGINS[:, ::-1]}
+        return SureDecisions.of(HeldOut(right, margins), parts, SECONDS)
+
+    def test_of_low_thresholds_decide_at_once_and_those_of_high_ones_at_the_end(self):
+        decided = self.decisions("a")
+        assert decided.seconds[0].tolist() == [0.4, 0.4]
+        assert decided.wrong[0].tolist() == [False, True]
+        assert decided.seconds[-1].tolist() == [1.2, 1.2]
+        assert not decided.wrong[-1].any()
+        assert (np.diff(decided.seconds, axis=0) >= 0.0).all()
+
+    def test_a_product_waits_for_the_later_factor_and_errs_where_either_does(self):
+        decided = self.decisions("a", "b")
+        assert decided.wrong[0].tolist() == [True, True]
+        assert decided.seconds[-1].tolist() == [1.2, 1.2]
+
+    def test_the_error_is_that_of_some_trials_between_two_thresholds(self):
+        decided = SureDecisions(
+            np.array([[0.4, 0.4], [0.4, 1.2]]),
+            np.array([[False, True], [False, False]]),
+        )
+        everything = np.array([True, True])
+        assert decided.error(np.array([0.4]), everything) == 0.5
+        assert decided.error(np.array([0.6]), everything) == pytest.approx(0.25)
+        assert decided.error(np.array([0.4, 0.6]), everything) == pytest.approx(0.375)
+        assert decided.error(np.array([0.6]), np.array([True, False])) == 0.0
+
+
+def early_settings(make_touch, folder, arm, k):
+    """The settings before the full window, where those of the full window take k
+    neighbours."""
+    for kind, seed in product(("hard", "soft"), range(6)):
+        touch = make_touch(kind=kind, seed=seed, arm=arm, labels={"softness": kind})
+        save(folder / f"{kind}-{seed}.npz", touch)
+    early = [c for c in candidates({}, joints=arm) if c.early or not arm]
+    dataset = load_trials([folder], Measurement(features_of(early)))
+    y = {"softness": dataset.labels("softness")}
+    choosing = Choosing(dataset, y, early, Divisions.of(dataset, y), samples=40)
+    full = Choice("IV", 1, k, features=early[0].grids[0].features)
+    return choosing.early(1.2, {"softness": SimpleNamespace(choice=full)})
+
+
+def test_decision_points_before_the_full_window_have_settings_where_joints_are_known(
+    make_touch, tmp_path
+):
+    early = early_settings(make_touch, tmp_path, arm=True, k=3)
+    assert early.until_s == 1.2
+    assert early.choices["softness"].projection == "lda"
+    assert len(early.by_fold) == 10
+    # The number of neighbours is that of the full window, as the graph has one.
+    assert {c["softness"].k for c in (early.choices, *early.by_fold)} == {3}
+
+
+def test_without_joints_they_have_the_settings_of_the_full_window(make_touch, tmp_path):
+    assert early_settings(make_touch, tmp_path, arm=False, k=3) is None
+
+
+def test_the_discriminants_of_all_tasks_serve_each_where_there_are_several():
+    labels = np.array(["a", "b"] * 10)
+    full = {task: Choice("none", 2, k) for task, k in (("t", 1), ("u", 5))}
+    tried = candidates(dict.fromkeys(full, labels), joints=True)
+    options = early_options([c for c in tried if c.early], full)
+    assert {option["t"].targets for option in options} == {("t", "u")}
+    assert {(option["t"].k, option["u"].k) for option in options} == {(1, 5)}
+    assert {option["t"].features for option in options} == {
+        expand(["contact", "sqrt_joints"]),
+        expand(["sqrt_joints"]),
+    }
+
+
+@pytest.fixture
+def settled():
+    """The function that settles between two features, each of which tells the labels
+    apart early for the trials of one half of the folds."""
+    rng = np.random.default_rng(1)
+    labels = np.array(["a", "b"] * 60)
+    folds = np.arange(120) // 12
+
+    def settle(first_tells):
+        X = rng.normal(size=(len(SHARES) + 1, 120, 2))
+        signs = np.where(labels == "a", 9.0, -9.0)
+        X[:, :, 0] += signs * first_tells
+        X[:, :, 1] += signs * ~first_tells
+        X[-1] += signs[:, None]
+        vectors = Vectors(X, {"t": labels}, ("max_force", "contact_area"), (1, 1))
+        first = {"t": Choice("none", 1, 1, "lda", features=("max_force",))}
+        second = {"t": Choice("none", 1, 1, "lda", features=("contact_area",))}
+        early = settle_early(vectors, 1.2, first, [first, second], folds, 1)
+        by_fold = [choices["t"].features[0] for choices in early.by_fold]
+        return early.choices["t"].features[0], by_fold
+
+    return settle
+
+
+def test_the_option_that_errs_least_often_when_sure_is_settled(settled):
+    assert settled(np.full(120, True))[0] == "max_force"
+    assert settled(np.full(120, False))[0] == "contact_area"
+
+
+def test_what_is_settled_without_a_fold_counts_the_trials_of_the_others(settled):
+    """The first feature tells the trials of six folds of ten; without one of them, and
+    noise aside, five of nine."""
+    choice, by_fold = settled(np.arange(120) < 65)
+    assert choice == "max_force"
+    assert by_fold[9] == "max_force"
+    assert by_fold[0] == "contact_area"

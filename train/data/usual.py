@@ -1,0 +1,71 @@
+"""How the training touches were made, against which the board doubts others.
+
+It compares a second region beside the contact, the standstill of joints, and the speed
+at which the arm came.
+"""
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from edge.touch.contact import FeatureSeries
+from edge.touch.doubts import is_several
+from edge.touch.joint_doubts import still_times
+from train.data.dataset import DataSet
+from train.data.folds import finest
+
+OFTEN = 0.2
+"""A second region is no doubt for a label if so many of its trials had one."""
+SELDOM = 0.01
+"""Share of the trials that may lie outside of a usual range, on one side."""
+SLOWER = 0.97
+"""Part of the least speed that is no doubt, as clocks and encoders err. At 0.9 of the
+speed, 4 % of the sure answers were wrong, as things had not moved yet."""
+FASTER = 1.15
+"""Part of the greatest speed that is no doubt. At 1.1 times the speed no more answers
+were wrong, at 1.2 times 7 % of the sure objects."""
+RESTS = 0.01
+"""Radians a second that the encoders of an arm at rest may show."""
+
+
+def usual_touches(
+    dataset: DataSet,
+    tasks: Sequence[str],
+    window_s: float,
+) -> dict[str, Any]:
+    """{field of `edge.model.info.ModelInfo`: what the training touches showed}."""
+    series = [trial.series for trial in dataset.trials]
+    labels = dataset.labels(finest({task: dataset.labels(task) for task in tasks}))
+    usual: dict[str, Any] = {}
+    usual["several_labels"] = _often_several(labels.tolist(), series, window_s)
+    rests = [_still_times(touch, window_s) for touch in series]
+    if any(rests):
+        longest = np.quantile(rests, 1.0 - SELDOM, axis=0)
+        usual["still_s"] = tuple(longest.tolist())
+    speeds = np.array([touch.speed for touch in series])
+    if np.isfinite(speeds).any():
+        low, high = np.nanquantile(speeds, (SELDOM, 1.0 - SELDOM))
+        usual["speeds"] = SLOWER * float(low), FASTER * float(high) + RESTS
+    return usual
+
+
+def _often_several(
+    labels: Sequence[str],
+    series: Sequence[FeatureSeries],
+    window_s: float,
+) -> tuple[str, ...]:
+    """The labels of which `OFTEN` or more of the trials have a second region."""
+    several: dict[str, list[bool]] = {}
+    for label, touch in zip(labels, series, strict=True):
+        several.setdefault(label, []).append(is_several(touch.felt(window_s)))
+    often = [label for label, trials in several.items() if np.mean(trials) >= OFTEN]
+    return tuple(sorted(filter(None, often)))
+
+
+def _still_times(touch: FeatureSeries, window_s: float) -> list[float]:
+    """The `still_times` of the joints within a window; none without joint angles."""
+    if touch.joints is None:
+        return []
+    t = touch.t[touch.t <= window_s]
+    return still_times(t, touch.joints[: len(t)])
