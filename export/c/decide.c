@@ -187,7 +187,8 @@ static bool is_decided(uint32_t index) {
     a->flags |= EC_UNCERTIFIED;
     return point == EC_POINTS - 1;
   }
-  if (task->is_product) return stop_product(task, a);
+  /* At a fixed window a product needs no answers of its factors. */
+  if (task->is_product && task->rule_confidence <= 1.0) return stop_product(task, a);
   bool waits = a->flags & EC_UNUSUAL;
   double likely = confidence(&task->rule_curve, task, distances[index], a->decision_label);
   bool sure = likely >= task->rule_confidence;
