@@ -272,14 +272,18 @@ def _skin(source: Source, info: ModelInfo, frames: int) -> None:
     kernel_cells = Cells(layout, KERNEL_CELLS)
     pooled = cells.count * ("taxel_force" in quantities)
     pooled_for_kernels = kernel_cells.count * ("taxel_kernels" in quantities)
-    row = 56 + 64 * len(zones) + 8 * info.joints + 4 * (pooled + pooled_for_kernels)
+    spreads = not quantities.isdisjoint(measures.QUANTITIES[6:])
+    row = 72 + 64 * max(len(zones), 1) + 8 * info.joints
+    row += 4 * (pooled + pooled_for_kernels)
     source.ram += frames * row + 8 * layout.alive.size + 2048
-    source.work += 9000 * frames * len(zones) + 4000 * info.width
+    source.work += (12000 if spreads else 4000) * frames * len(zones)
+    source.work += 2500 * info.width
     source.define("FRAMES", frames)
     source.define("ZONES", len(zones))
     source.define("CELLS", pooled)
     source.define("KERNEL_CELLS", pooled_for_kernels)
     source.define("MOTION", "motion" in quantities)
+    source.define("SPREADS", spreads)
     by_force = quantities & {"force_motion", "stiffness"}
     source.define("FORCE_MOTION", bool(by_force))
     zone_names = [f"EC_{name.upper()}" for name in (*zones, "no_zone")]
@@ -339,7 +343,7 @@ def _graph(source: Source, graph: CompiledGraph) -> None:
             [f"EC_{s.operator.upper()}", s.points, s.inputs, s.outputs, s.sizes]
         )
         is_product = s.operator == "Gemm"
-        source.work += 12 * prod(s.sizes[:2]) if is_product else 250 * max(s.sizes)
+        source.work += 16 * prod(s.sizes[:2]) if is_product else 400 * max(s.sizes)
     source.flash += 44 * len(steps)
     source.define("STEPS", len(steps))
     source.array("const ec_table", "ec_tables", tables)
