@@ -97,6 +97,7 @@ def write(
     source.ram = 8 * graph.arena
     source.define("ARENA", graph.arena)
     _skin(source, model.info, frames)
+    _geometry(source, model.info)
     _graph(source, graph)
     windows_s = [model.decision_points_s[point] for point in points]
     source.define("POINTS", len(points))
@@ -262,52 +263,60 @@ def _feature(
 
 
 def _skin(source: Source, info: ModelInfo, frames: int) -> None:
-    """The skin, the arm and what is measured in every frame."""
+    """The skin, and what is measured in every frame."""
     layout = info.layout
     types = feature_types(info.features)
     quantities = {feature.quantity for feature in types}
     zones = Zones(layout, types).names
     cells = Cells(layout)
     kernel_cells = Cells(layout, KERNEL_CELLS)
-    links = () if info.chain is None else info.chain.links
-    angles = layout.column_angles_deg or (0.0,)
-    counts = {
-        "ZONES": len(zones),
-        "CELLS": cells.count * ("taxel_force" in quantities),
-        "KERNEL_CELLS": kernel_cells.count * ("taxel_kernels" in quantities),
-        "FRAMES": frames,
-        "LINKS": len(links),
-        "MOTION": "motion" in quantities,
-        "FORCE_MOTION": not quantities.isdisjoint(("force_motion", "stiffness")),
-        "COLUMN_ANGLES": len(angles) > 1,
-        "SCALE": float(layout.counts_per_newton or 1.0),
-        "ALONG": float(layout.pitch[0]),
-        "AROUND": float(layout.pitch[1]),
-        "FORCE_FLOOR": float(transforms.force_floor(layout)),
-        "LENGTH_FLOOR": float(transforms.length_floor(layout)),
-    }
-    for owner, names in ((layout, OF_LAYOUT), (info, OF_INFO)):
-        counts |= {name.upper(): getattr(owner, name) or 0 for name in names}
-    for name, value in counts.items():
-        source.define(name, value)
-    row = 56 + 64 * len(zones) + 8 * info.joints
-    row += 4 * (counts["CELLS"] + counts["KERNEL_CELLS"])
+    pooled = cells.count * ("taxel_force" in quantities)
+    pooled_for_kernels = kernel_cells.count * ("taxel_kernels" in quantities)
+    spreads = not quantities.isdisjoint(measures.QUANTITIES[6:])
+    row = 72 + 64 * max(len(zones), 1) + 8 * info.joints
+    row += 4 * (pooled + pooled_for_kernels)
     source.ram += frames * row + 8 * layout.alive.size + 2048
-    source.work += 9000 * frames * len(zones) + 4000 * info.width
-    source.array("const bool", "ec_alive", layout.alive.reshape(-1))
+    source.work += (12000 if spreads else 4000) * frames * len(zones)
+    source.work += 2500 * info.width
+    source.define("FRAMES", frames)
+    source.define("ZONES", len(zones))
+    source.define("CELLS", pooled)
+    source.define("KERNEL_CELLS", pooled_for_kernels)
+    source.define("MOTION", "motion" in quantities)
+    source.define("SPREADS", spreads)
+    by_force = quantities & {"force_motion", "stiffness"}
+    source.define("FORCE_MOTION", bool(by_force))
     zone_names = [f"EC_{name.upper()}" for name in (*zones, "no_zone")]
     source.array("const uint8_t", "ec_zone_names", zone_names)
-    for name, pooled in (("", cells), ("kernel_", kernel_cells)):
-        numbers = _of_taxels(layout, pooled)
-        source.array("const int16_t", f"ec_{name}cell_of_taxel", numbers)
+    numbers = _of_taxels(layout, cells)
+    source.array("const int16_t", "ec_cell_of_taxel", numbers)
+    numbers = _of_taxels(layout, kernel_cells)
+    source.array("const int16_t", "ec_kernel_cell_of_taxel", numbers)
+
+
+def _geometry(source: Source, info: ModelInfo) -> None:
+    """Where the taxels lie, on which arm, and the scale of their counts."""
+    layout = info.layout
+    for owner, names in ((layout, OF_LAYOUT), (info, OF_INFO)):
+        for name in names:
+            source.define(name.upper(), getattr(owner, name) or 0)
+    along, around = layout.pitch
+    source.define("ALONG", float(along))
+    source.define("AROUND", float(around))
+    source.define("SCALE", float(layout.counts_per_newton or 1.0))
+    source.define("FORCE_FLOOR", float(transforms.force_floor(layout)))
+    source.define("LENGTH_FLOOR", float(transforms.length_floor(layout)))
+    source.array("const bool", "ec_alive", layout.alive.reshape(-1))
+    angles = layout.column_angles_deg or (0.0,)
     steps = [(b - a + 180.0) % 360.0 - 180.0 for a, b in pairwise([*angles, angles[0]])]
+    source.define("COLUMN_ANGLES", len(angles) > 1)
     source.array("const ec_angle", "ec_angles", zip(angles, steps, strict=True))
-    kinds = {"fixed": "EC_FIXED", "prismatic": "EC_PRISMATIC"}
-    rows = [
-        [axis, np.ravel(step), after, kinds.get(kind, "EC_REVOLUTE")]
-        for kind, axis, step, after in links
-    ]
-    source.array("const ec_link", "ec_links", floats(rows) or ["{{0}, {0}, {0}, 0}"])
+    rows = []
+    for kind, axis, step, after in info.chain.links if info.chain else ():
+        name = {"fixed": "FIXED", "prismatic": "PRISMATIC"}.get(kind, "REVOLUTE")
+        rows.append(floats([axis, np.ravel(step), after, f"EC_{name}"]))
+    source.define("LINKS", len(rows))
+    source.array("const ec_link", "ec_links", rows or ["{{0}, {0}, {0}, 0}"])
 
 
 def _of_taxels(layout: SkinLayout, cells: Cells) -> Array:
@@ -334,7 +343,7 @@ def _graph(source: Source, graph: CompiledGraph) -> None:
             [f"EC_{s.operator.upper()}", s.points, s.inputs, s.outputs, s.sizes]
         )
         is_product = s.operator == "Gemm"
-        source.work += 12 * prod(s.sizes[:2]) if is_product else 250 * max(s.sizes)
+        source.work += 16 * prod(s.sizes[:2]) if is_product else 400 * max(s.sizes)
     source.flash += 44 * len(steps)
     source.define("STEPS", len(steps))
     source.array("const ec_table", "ec_tables", tables)
@@ -349,8 +358,8 @@ def _tasks(
 ) -> None:
     """The tasks, their labels and their rules."""
     names = list(info.tasks)
-    rows = []
-    for i, (name, task) in enumerate(info.tasks.items()):
+    for i, name in enumerate(names):
+        task = info.tasks[name]
         factors = list(task.factors) or names[:1] * 2
         for j, factor in enumerate(factors):
             indices = task.factors.get(factor, ())
@@ -360,24 +369,14 @@ def _tasks(
         rule = rules.get(name)
         stopping = info.stopping.get(name)
         whole = stopping and (stopping.slope, stopping.intercept, stopping.doubt)
-        rows.append(
-            [
-                f"curves_of_{i}",
-                floats(whole or (0, 0, 0)),
-                float(rule.confidence if rule else 0.0),
-                [f"indices_{j}_of_{i}" for j in range(2)],
-                *(places.get(f"{name}_{end}", 0) for end in ENDS),
-                len(task.labels),
-                task.k,
-                map(names.index, factors),
-                rule.last if rule else 0,
-                rule is not None,
-                bool(task.factors),
-            ]
-        )
-    most = max(len(task.labels) for task in info.tasks.values())
+        places_of_task = [places.get(f"{name}_{end}", 0) for end in ENDS]
+        row = [f"curves_of_{i}", floats(whole or (0, 0, 0))]
+        row += [rule.confidence, rule.last, True] if rule else [0.0, 0, False]
+        row += [[f"indices_{j}_of_{i}" for j in range(2)], places_of_task]
+        row += [len(task.labels), task.k, [*map(names.index, factors)]]
+        source.tasks.append([*row, bool(task.factors)])
     source.define("TASKS", len(names))
-    source.define("MOST_LABELS", most)
+    source.define("MOST_LABELS", max(len(task.labels) for task in info.tasks.values()))
     for output in ("out_of_range", "novelty", "remoteness"):
         source.define(f"PLACE_{output.upper()}", places.get(output, 0))
     order = sorted(range(len(names)), key=lambda i: bool(info.tasks[names[i]].factors))
@@ -385,7 +384,6 @@ def _tasks(
     lists = [f"labels_of_{i}" for i in range(len(names))]
     source.array("const char *const *const", "ec_labels", lists)
     source.array("const char *const", "ec_task_names", map(quoted, names))
-    source.tasks = rows
 
 
 def _calibration(
@@ -402,15 +400,17 @@ def _calibration(
         limits |= {"typical": info.novelty.typical, "novel": info.novelty.limits}
     for i, name in enumerate(info.tasks):
         stopping = info.stopping.get(name)
-        columns = stopping and (stopping.slopes, stopping.intercepts, stopping.doubts)
-        curves = [[column[point] for column in columns or ()] for point in points]
-        source.array("static const ec_curve", f"curves_of_{i}", floats(curves))
-        remoteness = stopping and stopping.remoteness
-        if remoteness:
+        curves: Iterable[Any] = ()
+        if stopping is not None:
+            curves = zip(
+                stopping.slopes, stopping.intercepts, stopping.doubts, strict=True
+            )
+        kept = [curve for point, curve in enumerate(curves) if point in points]
+        source.array("static const ec_curve", f"curves_of_{i}", floats(kept) or ["{0}"])
+        if stopping is not None and stopping.remoteness is not None:
             naming = i
-            limits |= {"remote": remoteness.limits, "middles": remoteness.middles}
-            limits["known_slopes"] = remoteness.slopes
-    for name in ("typical", "novel", "remote", "middles", "known_slopes"):
+            limits |= vars(stopping.remoteness) | {"remote": stopping.remoteness.limits}
+    for name in ("typical", "novel", "remote", "middles", "slopes"):
         values = [limits[name][point] for point in points if name in limits]
         source.array("const double", f"ec_{name}", floats(values))
     source.define("NAMING", naming)

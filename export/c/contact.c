@@ -193,7 +193,11 @@ int ec_follow(const uint16_t *counts, const bool *valid, double t, const double 
     return 0;
   }
   ec_now.frames++;
-  if (!confirmed || ec_now.age_s < EC_WINDOW_S) error = add(counts, valid, joints, age_s, touched);
+  /* A reading without contact replaces none of its instant. */
+  bool is_new = touched || age_s > ec_now.age_s;
+  if (is_new && (!confirmed || ec_now.age_s < EC_WINDOW_S)) {
+    error = add(counts, valid, joints, age_s, touched);
+  }
   if (touched) {
     ec_now.touched_s = age_s;
   } else if (ec_released(ec_now.touched_s, age_s)) {

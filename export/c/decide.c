@@ -52,7 +52,7 @@ static double excess(void) {
 static double known(void) {
   double score = output(EC_PLACE_REMOTENESS);
   if (score <= 0.0) return 1.0;
-  return ec_logistic(ec_known_slopes[point] * ec_log(ec_middles[point] / score));
+  return ec_logistic(ec_slopes[point] * ec_log(ec_middles[point] / score));
 }
 
 /* The calibrated confidence of a label by its curve. */
@@ -101,15 +101,15 @@ static void ask(uint32_t index, uint16_t doubts) {
   double most = 0.0;
   uint32_t ties = 0;
   for (uint32_t i = 0; i < task->labels; i++) {
-    double votes = output(task->scores + i);
+    double votes = output(task->places.scores + i);
     ties = votes > most ? 1 : ties + (votes == most);
     if (votes > most) most = votes;
   }
   a->label = a->decision_label;
   a->stopped_by = EC_NOTHING;
-  a->nearest = (uint32_t)output(task->neighbours);
+  a->nearest = (uint32_t)output(task->places.neighbours);
   a->flags = doubts;
-  a->flags |= flag(output(task->distances) == 0.0, EC_AS_TRAINED);
+  a->flags |= flag(output(task->places.distances) == 0.0, EC_AS_TRAINED);
   a->flags |= flag(output(EC_PLACE_OUT_OF_RANGE) > 0.0, EC_OUT_OF_RANGE);
   a->flags |= flag(ties > 1, EC_TIE);
   a->confidence = EC_NAN;
@@ -129,10 +129,10 @@ static void ask_all(bool is_short) {
   ec_vector(ec_windows_s[point]);
   ec_graph(point);
   for (uint32_t i = 0; i < EC_TASKS; i++) {
-    answers[i].decision_label = (int16_t)output(ec_tasks[i].label);
+    answers[i].decision_label = (int16_t)output(ec_tasks[i].places.label);
     refused = refused || answers[i].decision_label < 0;
-    for (uint32_t j = 0; ec_tasks[i].label_distances && j < ec_tasks[i].labels; j++) {
-      distances[i][j] = output(ec_tasks[i].label_distances + j);
+    for (uint32_t j = 0; ec_tasks[i].places.label_distances && j < ec_tasks[i].labels; j++) {
+      distances[i][j] = output(ec_tasks[i].places.label_distances + j);
     }
   }
   for (uint32_t i = 0; i < EC_TASKS; i++) {
@@ -187,7 +187,8 @@ static bool is_decided(uint32_t index) {
     a->flags |= EC_UNCERTIFIED;
     return point == EC_POINTS - 1;
   }
-  if (task->is_product) return stop_product(task, a);
+  /* At a fixed window a product needs no answers of its factors. */
+  if (task->is_product && task->rule_confidence <= 1.0) return stop_product(task, a);
   bool waits = a->flags & EC_UNUSUAL;
   double likely = confidence(&task->rule_curve, task, distances[index], a->decision_label);
   bool sure = likely >= task->rule_confidence;

@@ -69,36 +69,42 @@ static void unwrap(double *col) {
   }
 }
 
+/* Variances and the covariance are whole numbers over force squared, so nothing cancels. */
+static void spread(const int64_t *zone, double *q) {
+  int64_t f = zone[2];
+  int64_t r = zone[3];
+  int64_t c = zone[4];
+  double total = f > 1 ? (double)f : 1.0;
+  double rows = (double)(f * zone[5] - r * r) / total / total;
+  double cols = (double)(f * zone[7] - c * c) / total / total;
+  double slant = (double)(f * zone[6] - r * c) / total / total;
+  double across = rows - cols;
+  double larger = 0.5 * (rows + cols + ec_sqrt(across * across + 4.0 * slant * slant));
+  double determinant = rows * cols - slant * slant;
+  if (!(determinant > 0.0)) determinant = 0.0;
+  q[EC_SPREAD_ALONG * EC_FRAMES] = ec_sqrt(rows);
+  q[EC_SPREAD_AROUND * EC_FRAMES] = ec_sqrt(cols);
+  q[EC_SLANT * EC_FRAMES] = slant;
+  q[EC_LENGTH * EC_FRAMES] = ec_sqrt(larger);
+  q[EC_WIDTH_OF_ZONE * EC_FRAMES] = ec_sqrt(larger > 0.0 ? determinant / larger : 0.0);
+}
+
 /* The quantities of a zone in all felt frames. */
 static void measure(uint32_t index) {
   for (uint32_t i = 0; i < frames; i++) {
     const int64_t *zone = felt[i]->zones[index];
     double *q = columns + i;
     double force = (double)zone[2];
-    int64_t f = zone[2];
-    int64_t r = zone[3];
-    int64_t c = zone[4];
-    double total = f > 1 ? force : 1.0;
-    double rows = (double)(f * zone[5] - r * r) / total / total;
-    double cols = (double)(f * zone[7] - c * c) / total / total;
-    double slant = (double)(f * zone[6] - r * c) / total / total;
-    double across = rows - cols;
-    double larger = 0.5 * (rows + cols + ec_sqrt(across * across + 4.0 * slant * slant));
-    double determinant = rows * cols - slant * slant;
-    if (!(determinant > 0.0)) determinant = 0.0;
+    double area = (double)zone[1];
     q[EC_MAX_FORCE * EC_FRAMES] = (double)zone[0] / EC_SCALE;
     q[EC_FORCE * EC_FRAMES] = force / EC_SCALE;
-    q[EC_AREA * EC_FRAMES] = (double)zone[1];
-    q[EC_PRESSURE * EC_FRAMES] = force / ((double)(zone[1] > 1 ? zone[1] : 1) * EC_SCALE);
-    q[EC_ALONG_ROWS * EC_FRAMES] = f > 0 ? (double)r / force : EC_NAN;
-    q[EC_AROUND_COLS * EC_FRAMES] = f > 0 ? (double)c / force : EC_NAN;
-    q[EC_SPREAD_ALONG * EC_FRAMES] = ec_sqrt(rows);
-    q[EC_SPREAD_AROUND * EC_FRAMES] = ec_sqrt(cols);
-    q[EC_SLANT * EC_FRAMES] = slant;
-    q[EC_LENGTH * EC_FRAMES] = ec_sqrt(larger);
-    q[EC_WIDTH_OF_ZONE * EC_FRAMES] = ec_sqrt(larger > 0.0 ? determinant / larger : 0.0);
+    q[EC_AREA * EC_FRAMES] = area;
+    q[EC_PRESSURE * EC_FRAMES] = force / ((area > 1.0 ? area : 1.0) * EC_SCALE);
+    q[EC_ALONG_ROWS * EC_FRAMES] = force > 0.0 ? (double)zone[3] / force : EC_NAN;
+    q[EC_AROUND_COLS * EC_FRAMES] = force > 0.0 ? (double)zone[4] / force : EC_NAN;
     q[EC_STIFFNESS * EC_FRAMES] =
         (force / EC_SCALE + EC_FORCE_FLOOR) / (felt[i]->motions[1] + EC_LENGTH_FLOOR);
+    if (EC_SPREADS) spread(zone, q);
   }
   if (EC_WRAPS) unwrap(columns + EC_AROUND_COLS * EC_FRAMES);
 }

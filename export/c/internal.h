@@ -187,17 +187,15 @@ typedef struct {
   const ec_curve *curves; /* of each decision point */
   ec_curve rule_curve;
   double rule_confidence; /* above 1: a fixed window */
+  uint8_t rule_last;
+  bool has_rule;
   const uint8_t *indices[2]; /* of a product: the factors' label of each label */
-  uint32_t label;
-  uint32_t scores;
-  uint32_t distances;
-  uint32_t neighbours;
-  uint32_t label_distances; /* 0: none */
+  struct {
+    uint32_t label, scores, distances, neighbours, label_distances; /* 0: none */
+  } places;
   uint16_t labels;
   uint16_t k;
   uint8_t factors[2];
-  uint8_t rule_last;
-  bool has_rule;
   bool is_product;
 } ec_task;
 
@@ -207,7 +205,7 @@ extern const double ec_typical[]; /* of each decision point */
 extern const double ec_novel[];
 extern const double ec_remote[];
 extern const double ec_middles[];
-extern const double ec_known_slopes[];
+extern const double ec_slopes[];
 
 /* graph.c: edge/model/graph.py */
 extern double ec_arena[EC_ARENA];

@@ -132,14 +132,15 @@ def early(tmp_path_factory):
     folder = tmp_path_factory.mktemp("early")
     data = save_touches(folder / "data", 15)
     words = ["--features", "contact", "moments", "joints", "--quick", "--scaling", "IV"]
-    words += ["--decision-points", "0.3,0.6,1.2"]
+    words += ["--decision-points", "0.3,0.6,1.2", "--c", folder / "c"]
     model = Model(export(folder / "out", "--data", data, *words) / "model.onnx")
     rng = np.random.default_rng(5)
     touches = [
         touch(kind=kind, seed=30 + i) for i in range(4) for kind in ("hard", "soft")
     ]
     touches.append(in_a_row(touch(seed=50, seconds=0.5), touch(seed=51)))
-    return model, touches + [damaged(recording, rng) for recording in touches]
+    touches += [damaged(recording, rng) for recording in touches]
+    return model, touches
 
 
 @needs_gcc
@@ -161,6 +162,23 @@ def test_early_decisions_have_the_same_bits(early, tmp_path):
     errors = {s.rules[i].error for s in model.info.stopping.values() for i in (0, -1)}
     for i, error in enumerate([None, *sorted(errors)]):
         check(model, tmp_path / str(i), touches, vectors, error)
+
+
+@pytest.mark.slow
+@needs_gcc
+def test_export_writes_a_program_that_reads_touches_as_text(early):
+    model, touches = early
+    folder = Path(model.path).parents[1] / "c"
+    sources = map(str, folder.glob("*.c"))
+    build = ["gcc", "-std=c99", "-O2", "-ffp-contract=off", *sources, "-o", "decide"]
+    subprocess.run(build, cwd=folder, check=True)
+    frames = zip(touches[0].t, touches[0].frames, strict=True)
+    text = " ".join(f"{float(t)!r} {' '.join(map(str, f.ravel()))}" for t, f in frames)
+    words = {"input": text, "text": True, "check": True}
+    program = [str(folder / "decide")]
+    lines = subprocess.run(program, capture_output=True, **words).stdout.splitlines()
+    assert lines[0] == "onset at 0.200 s"
+    assert sorted(line.split(":")[0] for line in lines[1:]) == sorted(model.info.tasks)
 
 
 @pytest.mark.slow

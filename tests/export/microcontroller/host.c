@@ -36,14 +36,14 @@ static frame next_frame(void) {
 /* Of a vector that is refused, what follows from its distances may be anything. */
 static void give_outputs(void) {
   bool refused = false;
-  for (uint32_t i = 0; i < EC_TASKS; i++) refused |= ec_arena[ec_tasks[i].label] < 0.0;
+  for (uint32_t i = 0; i < EC_TASKS; i++) refused |= ec_arena[ec_tasks[i].places.label] < 0.0;
   for (const ec_task *task = ec_tasks; task < ec_tasks + EC_TASKS; task++) {
-    give(ec_arena + task->label, 1);
-    give(ec_arena + task->scores, task->labels);
+    give(ec_arena + task->places.label, 1);
+    give(ec_arena + task->places.scores, task->labels);
     if (refused) continue;
-    give(ec_arena + task->distances, task->k);
-    give(ec_arena + task->neighbours, task->k);
-    if (task->label_distances) give(ec_arena + task->label_distances, task->labels);
+    give(ec_arena + task->places.distances, task->k);
+    give(ec_arena + task->places.neighbours, task->k);
+    if (task->places.label_distances) give(ec_arena + task->places.label_distances, task->labels);
   }
   if (refused) return;
   give(ec_arena + EC_PLACE_OUT_OF_RANGE, 1);
