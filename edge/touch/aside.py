@@ -144,8 +144,8 @@ class AsideTaxels:
             shown = replace(shown, counts=np.where(long.mask, 0, shown.counts))
             beside = active_taxels(shown, self._layout)
         over = []
-        if (self._hidden & ~former).any() and (long or not beside.bits):
-            over = self._tracker.end(beside)
+        if (self._hidden & ~former).any() and self._begins(beside):
+            over = self._tracker.end()
         contacts = over + self._tracker.follow(shown, beside)
         self._keep_early(frame, active, contacts)
         if not is_early:
@@ -214,6 +214,11 @@ class AsideTaxels:
         if not active.has_other(former, self._layout.onset):
             return None
         return self._connected(active, self._long)
+
+    def _begins(self, beside: ActiveTaxels) -> bool:
+        """Whether the contact that now is the largest begins, or there is none."""
+        largest = beside.largest()
+        return largest is None or not largest.bits & self._former
 
     def _connected(self, active: ActiveTaxels, bits: int) -> Region:
         """The active taxels that are connected to some taxels, or next to them."""

@@ -134,11 +134,10 @@ class ContactTracker:
         self.contacts = [contact for contact in contacts if not contact.ended]
         return self._confirmed(contacts)
 
-    def end(self, active: ActiveTaxels) -> list[Contact]:
-        """End the contact, unless some of the last frame's region is still active;
-        returned if it was confirmed. Of several contacts each ends by itself."""
-        goes_on = self.region is not None and self.region.bits & active.bits
-        if goes_on or self.max_contacts > 1:
+    def end(self) -> list[Contact]:
+        """End the contact, and return it if it was confirmed. Of several contacts each
+        ends by itself."""
+        if self.max_contacts > 1:
             return []
         contacts = self.contacts
         self.contacts = []
