@@ -189,12 +189,12 @@ typedef struct {
   double rule_confidence; /* above 1: a fixed window */
   uint8_t rule_last;
   bool has_rule;
-  const uint8_t *indices[2]; /* of a product: the factors' label of each label */
   struct {
     uint32_t label, scores, distances, neighbours, label_distances; /* 0: none */
   } places;
   uint16_t labels;
   uint16_t k;
+  const uint8_t *indices[2]; /* of a product: the factors' label of each label */
   uint8_t factors[2];
   bool is_product;
 } ec_task;
