@@ -37,20 +37,8 @@ LARGEST = 2**63
 """No product of a frame's sums may reach it."""
 MOST_SUMMED = 128
 """Samples beyond which numpy sums up in halves."""
-QUANTITIES = {
-    ("contact", "max_force"): "EC_REGION_PEAK",
-    ("contact", "area"): "EC_REGION_AREA",
-    ("contact", "motion"): "EC_CENTROID_MOTION",
-    ("contact", "force_motion"): "EC_CENTRE_OF_FORCE_MOTION",
-    ("skin", "taxel_kernels"): "EC_TAXEL_KERNELS",
-    ("skin", "zone_kernels"): "EC_ZONE_KERNELS",
-    ("skin", "taxel_force"): "EC_TAXEL_FORCE",
-    ("arm", "joint_angle"): "EC_JOINT_ANGLE",
-    ("arm", "joint_change"): "EC_JOINT_CHANGE",
-}
-"""{(zone, quantity): its name in C}, but for those that a zone's sums make."""
-OF_ZONES = {"along": "ALONG_ROWS", "around": "AROUND_COLS", "width": "WIDTH_OF_ZONE"}
-ROOTS = {"sqrt": "ROOT", "": "COURSE"}
+ALONE = {*measures.ALONE.values(), ("contact", "area")} - {("skin", "stiffness")}
+"""(zone, quantity) that need no sums of a zone."""
 TYPES_IN_C = {
     "EC_INT8": "int8_t",
     "EC_INT16": "int16_t",
@@ -257,16 +245,14 @@ def _feature(
     feature: Feature, layout: SkinLayout, samples: int, rows: int
 ) -> list[Any]:
     """The `ec_feature` of a feature."""
-    place = feature.zone, feature.quantity
-    name = OF_ZONES.get(feature.quantity, feature.quantity.upper())
-    quantity = QUANTITIES.get(place, f"EC_{name}")
-    of_zone = place not in QUANTITIES
-    zone = f"EC_{feature.zone.upper()}" if of_zone else "EC_NO_ZONE"
-    kinds = [f"EC_{ROOTS.get(t, t.upper())}" for t in feature.transforms]
+    alone = (feature.zone, feature.quantity) in ALONE
+    of_region = "REGION_" * (alone and feature.zone == "contact")
+    quantity = f"EC_Q_{of_region}{feature.quantity.upper()}"
+    zone = "EC_NO_ZONE" if alone else f"EC_{feature.zone.upper()}"
+    kinds = [f"EC_T_{kind.upper()}" for kind in (*feature.transforms, *["none"] * 3)]
     floor = float(transforms.floor_of(feature, layout))
-    summary = ROOTS.get(feature.summary, feature.summary.upper())
-    kinds += ["EC_NO_TRANSFORM"] * (3 - len(kinds))
-    return [floor, samples, rows, zone, quantity, kinds, f"EC_{summary}"]
+    summary = f"EC_S_{feature.summary.upper()}"
+    return [floor, samples, rows, zone, quantity, kinds[:3], summary]
 
 
 def _skin(source: Source, info: ModelInfo, frames: int) -> None:
