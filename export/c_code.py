@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import os
 import shutil
+import string
 from collections.abc import Iterable, Mapping, Sequence
 from itertools import pairwise
 from math import ceil, prod
@@ -36,20 +37,8 @@ LARGEST = 2**63
 """No product of a frame's sums may reach it."""
 MOST_SUMMED = 128
 """Samples beyond which numpy sums up in halves."""
-QUANTITIES = {
-    ("contact", "max_force"): "EC_REGION_PEAK",
-    ("contact", "area"): "EC_REGION_AREA",
-    ("contact", "motion"): "EC_CENTROID_MOTION",
-    ("contact", "force_motion"): "EC_CENTRE_OF_FORCE_MOTION",
-    ("skin", "taxel_kernels"): "EC_TAXEL_KERNELS",
-    ("skin", "zone_kernels"): "EC_ZONE_KERNELS",
-    ("skin", "taxel_force"): "EC_TAXEL_FORCE",
-    ("arm", "joint_angle"): "EC_JOINT_ANGLE",
-    ("arm", "joint_change"): "EC_JOINT_CHANGE",
-}
-"""{(zone, quantity): its name in C}, but for those that a zone's sums make."""
-OF_ZONES = {"along": "ALONG_ROWS", "around": "AROUND_COLS", "width": "WIDTH_OF_ZONE"}
-ROOTS = {"sqrt": "ROOT", "": "COURSE"}
+ALONE = {*measures.ALONE.values(), ("contact", "area")} - {("skin", "stiffness")}
+"""(zone, quantity) that need no sums of a zone."""
 TYPES_IN_C = {
     "EC_INT8": "int8_t",
     "EC_INT16": "int16_t",
@@ -92,6 +81,7 @@ def write(
     points = [last] if error is None else [*range(last + 1)]
     source = Source()
     scratch = _features(source, model.info, frames)
+    _kernels(source, model.info)
     least = model.info.width + scratch
     graph = CompiledGraph(model, list(model.outputs), points, least)
     source.ram = 8 * graph.arena
@@ -103,8 +93,9 @@ def write(
     source.define("POINTS", len(points))
     source.array("const double", "ec_windows_s", floats(windows_s))
     rules = {} if error is None else stopping_rules(model, error)
-    _tasks(source, model.info, graph.places, rules)
-    _calibration(source, model.info, points, early=error is not None)
+    _tasks(source, model.info, graph.places, points, rules)
+    _limits(source, model.info, points)
+    source.define("EARLY", error is not None)
     target = Path(folder)
     target.mkdir(parents=True, exist_ok=True)
     for file in ROOMS.iterdir():
@@ -167,7 +158,6 @@ class Source:
         self.flash = CODE_BYTES
         self.ram = 0
         self.work = 0
-        self.tasks: list[Any] = []
 
     def define(self, name: str, value: object) -> None:
         """A constant of the preprocessor."""
@@ -232,34 +222,37 @@ def _features(source: Source, info: ModelInfo, frames: int) -> int:
         rows.append(_feature(feature, layout, samples, count))
     source.define("FEATURES", len(rows))
     source.array("const ec_feature", "ec_features", rows)
+    return largest + (len(measures.QUANTITIES) + 4) * frames
+
+
+def _kernels(source: Source, info: ModelInfo) -> None:
+    """The tables of the features that are made of kernels."""
     for name in ("taxel_kernels", "zone_kernels"):
         table = info.kernels.get(name, KernelTable((), ()))
-        mixed = mixes(len(table.shifts)) if table.shifts else ()
-        indices = [np.flatnonzero(mix).tolist() for mix in mixed]
-        flat = [number for mix in indices for number in (len(mix), *mix)]
+        channels = len(table.shifts)
+        flat = []
+        for mix in mixes(channels) if channels else ():
+            flat += [int(mix.sum()), *np.flatnonzero(mix).tolist()]
         source.array("static const int8_t", f"shifts_of_{name}", table.shifts)
         source.array("static const int32_t", f"biases_of_{name}", table.biases)
         source.array("static const uint8_t", f"mixes_of_{name}", flat)
         parts = [f"{part}_of_{name}" for part in ("shifts", "biases", "mixes")]
-        fields = [*parts, len(table.shifts), BIASES.get(len(table.biases), (0,))]
+        fields = [*parts, channels, BIASES.get(len(table.biases), (0,))]
         source.lines.append(f"const ec_kernels ec_{name} = {literal(fields)};")
-    return largest + (len(measures.QUANTITIES) + 4) * frames
 
 
 def _feature(
     feature: Feature, layout: SkinLayout, samples: int, rows: int
 ) -> list[Any]:
     """The `ec_feature` of a feature."""
-    place = feature.zone, feature.quantity
-    name = OF_ZONES.get(feature.quantity, feature.quantity.upper())
-    quantity = QUANTITIES.get(place, f"EC_{name}")
-    of_zone = place not in QUANTITIES
-    zone = f"EC_{feature.zone.upper()}" if of_zone else "EC_NO_ZONE"
-    kinds = [f"EC_{ROOTS.get(t, t.upper())}" for t in feature.transforms]
+    alone = (feature.zone, feature.quantity) in ALONE
+    of_region = "REGION_" * (alone and feature.zone == "contact")
+    quantity = f"EC_Q_{of_region}{feature.quantity.upper()}"
+    zone = "EC_NO_ZONE" if alone else f"EC_{feature.zone.upper()}"
+    kinds = [f"EC_T_{kind.upper()}" for kind in (*feature.transforms, *["none"] * 3)]
     floor = float(transforms.floor_of(feature, layout))
-    summary = ROOTS.get(feature.summary, feature.summary.upper())
-    kinds += ["EC_NO_TRANSFORM"] * (3 - len(kinds))
-    return [floor, samples, rows, zone, quantity, kinds, f"EC_{summary}"]
+    summary = f"EC_S_{feature.summary.upper()}"
+    return [floor, samples, rows, zone, quantity, kinds[:3], summary]
 
 
 def _skin(source: Source, info: ModelInfo, frames: int) -> None:
@@ -354,27 +347,19 @@ def _tasks(
     source: Source,
     info: ModelInfo,
     places: Mapping[str, int],
+    points: Sequence[int],
     rules: Mapping[str, StoppingRule | None],
 ) -> None:
-    """The tasks, their labels and their rules."""
+    """The tasks, their labels and their calibration."""
     names = list(info.tasks)
+    rows = []
     for i, name in enumerate(names):
-        task = info.tasks[name]
-        factors = list(task.factors) or names[:1] * 2
-        for j, factor in enumerate(factors):
-            indices = task.factors.get(factor, ())
-            source.array("static const uint8_t", f"indices_{j}_of_{i}", indices)
-        labels = map(quoted, task.labels)
+        labels = map(quoted, info.tasks[name].labels)
         source.array("static const char *const", f"labels_of_{i}", labels)
-        rule = rules.get(name)
-        stopping = info.stopping.get(name)
-        whole = stopping and (stopping.slope, stopping.intercept, stopping.doubt)
+        row = [*_calibration(source, info, name, points), *_rule(rules.get(name))]
         places_of_task = [places.get(f"{name}_{end}", 0) for end in ENDS]
-        row = [f"curves_of_{i}", floats(whole or (0, 0, 0))]
-        row += [rule.confidence, rule.last, True] if rule else [0.0, 0, False]
-        row += [[f"indices_{j}_of_{i}" for j in range(2)], places_of_task]
-        row += [len(task.labels), task.k, [*map(names.index, factors)]]
-        source.tasks.append([*row, bool(task.factors)])
+        rows.append([*row, places_of_task, *_product(source, info, name)])
+    source.array("const ec_task", "ec_tasks", rows)
     source.define("TASKS", len(names))
     source.define("MOST_LABELS", max(len(task.labels) for task in info.tasks.values()))
     for output in ("out_of_range", "novelty", "remoteness"):
@@ -386,27 +371,49 @@ def _tasks(
     source.array("const char *const", "ec_task_names", map(quoted, names))
 
 
+def _rule(rule: StoppingRule | None) -> list[Any]:
+    return [0.0, 0, False] if rule is None else [rule.confidence, rule.last, True]
+
+
+def _product(source: Source, info: ModelInfo, name: str) -> list[Any]:
+    """Of a task: its size, its factors, and their label of each of its labels."""
+    names = list(info.tasks)
+    task = info.tasks[name]
+    arrays = []
+    for j, indices in enumerate((*task.factors.values(), (), ())[:2]):
+        arrays.append(f"indices_{j}_of_{names.index(name)}")
+        source.array("static const uint8_t", arrays[-1], indices)
+    factors = [*map(names.index, task.factors), 0, 0][:2]
+    return [len(task.labels), task.k, arrays, factors, bool(task.factors)]
+
+
 def _calibration(
     source: Source,
     info: ModelInfo,
+    name: str,
     points: Sequence[int],
-    *,
-    early: bool,
-) -> None:
-    """The curves and limits at the decision points, and with them the tasks."""
+) -> list[Any]:
+    """The curves of a task: the name of those of the decision points, and the rules'."""
+    array = f"curves_of_{[*info.tasks].index(name)}"
+    columns: Sequence[Sequence[float]] = ((0.0,),) * 3
+    whole = [0.0] * 3
+    stopping = info.stopping.get(name)
+    if stopping is not None:
+        columns = stopping.slopes, stopping.intercepts, stopping.doubts
+        whole = [stopping.slope, stopping.intercept, stopping.doubt]
+    curves = [[column[point] for column in columns] for point in points]
+    source.array("static const ec_curve", array, floats(curves))
+    return [array, floats(whole)]
+
+
+def _limits(source: Source, info: ModelInfo, points: Sequence[int]) -> None:
+    """The limits of novelty and remoteness at the decision points."""
     naming = 255
-    limits: dict[str, Sequence[float]] = {}
+    limits: dict[str, Any] = {}
     if info.novelty is not None:
         limits |= {"typical": info.novelty.typical, "novel": info.novelty.limits}
     for i, name in enumerate(info.tasks):
         stopping = info.stopping.get(name)
-        curves: Iterable[Any] = ()
-        if stopping is not None:
-            curves = zip(
-                stopping.slopes, stopping.intercepts, stopping.doubts, strict=True
-            )
-        kept = [curve for point, curve in enumerate(curves) if point in points]
-        source.array("static const ec_curve", f"curves_of_{i}", floats(kept) or ["{0}"])
         if stopping is not None and stopping.remoteness is not None:
             naming = i
             limits |= vars(stopping.remoteness) | {"remote": stopping.remoteness.limits}
@@ -415,13 +422,13 @@ def _calibration(
         source.array("const double", f"ec_{name}", floats(values))
     source.define("NAMING", naming)
     source.define("CALIBRATED", info.novelty is not None)
-    source.define("EARLY", early)
-    source.array("const ec_task", "ec_tasks", source.tasks)
 
 
 def quoted(text: str) -> str:
-    """A text as a literal of C: the bytes of UTF-8."""
-    return '"' + "".join(f"\\{byte:03o}" for byte in text.encode()) + '"'
+    """A text as a literal of C: ASCII, and other bytes of UTF-8 by their numbers."""
+    plain = set(string.ascii_letters + string.digits + " -_.,:;()/+").__contains__
+    codes = (chr(b) if plain(chr(b)) else f"\\{b:03o}" for b in text.encode())
+    return '"' + "".join(codes) + '"'
 
 
 def floats(values: Any) -> Any:

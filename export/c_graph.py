@@ -93,25 +93,28 @@ class CompiledGraph:
         if len(points) > MOST_POINTS:
             raise InputError(f"C takes at most {MOST_POINTS} decision points")
         self.arena = max(arena, model.info.width)
-        graph = Graph(model.contents)
-        self._makers = graph.makers
-        x = np.zeros((1, model.info.width))
-        constants = {n: v for n, v in graph.constants.items() if n != "decision_point"}
-        self._constants = [
-            _folded(model.contents.nodes, constants, point) for point in points
-        ]
-        names = [name for name in graph.makers if name not in self._constants[0]]
-        values = graph.run(names, {"features": x})
-        made = {"features": x} | dict(zip(names, values, strict=True))
-        self._made = set(made)
-        made |= self._constants[0]
-        self._shapes = {name: value.shape for name, value in made.items()}
-        self._needs = [self._needed(outputs, i) for i in range(len(points))]
         self.tables: list[Table] = []
         self._numbers: dict[bytes, int] = {}
+        self._read(model, points)
+        self._needs = [self._needed(outputs, i) for i in range(len(points))]
         nodes = self._in_order(outputs)
         self._place(nodes, outputs)
         self.steps = [step for node in nodes for step in self._steps(node)]
+
+    def _read(self, model: Model, points: Sequence[int]) -> None:
+        """The values that constants make at each decision point, and all shapes."""
+        graph = Graph(model.contents)
+        constants = {n: v for n, v in graph.constants.items() if n != "decision_point"}
+        nodes = model.contents.nodes
+        self._makers = graph.makers
+        self._constants = [_folded(nodes, constants, point) for point in points]
+        names = [name for name in graph.makers if name not in self._constants[0]]
+        x = np.zeros((1, model.info.width))
+        values = graph.run(names, {"features": x})
+        made = {"features": x} | dict(zip(names, values, strict=True))
+        self._made = set(made)
+        known = made | self._constants[0]
+        self._shapes = {name: value.shape for name, value in known.items()}
 
     def _inputs(self, node: Node, point: int) -> Sequence[str]:
         """The inputs that a node needs at a decision point."""

@@ -4,9 +4,9 @@
 
 /* Behind the vector, the arena is free until the graph is computed. */
 static double *const columns = ec_arena + EC_WIDTH; /* [quantity][frame] of a zone */
-static double *const known_t = ec_arena + EC_WIDTH + EC_ZONE_QUANTITIES * EC_FRAMES;
-static double *const known = ec_arena + EC_WIDTH + (EC_ZONE_QUANTITIES + 1) * EC_FRAMES;
-static double *const samples = ec_arena + EC_WIDTH + (EC_ZONE_QUANTITIES + 2) * EC_FRAMES;
+static double *const known_t = ec_arena + EC_WIDTH + EC_QUANTITIES * EC_FRAMES;
+static double *const known = ec_arena + EC_WIDTH + (EC_QUANTITIES + 1) * EC_FRAMES;
+static double *const samples = ec_arena + EC_WIDTH + (EC_QUANTITIES + 2) * EC_FRAMES;
 
 static const ec_row *felt[EC_FRAMES];
 static uint32_t frames; /* of felt */
@@ -82,11 +82,11 @@ static void spread(const int64_t *zone, double *q) {
   double larger = 0.5 * (rows + cols + ec_sqrt(across * across + 4.0 * slant * slant));
   double determinant = rows * cols - slant * slant;
   if (!(determinant > 0.0)) determinant = 0.0;
-  q[EC_SPREAD_ALONG * EC_FRAMES] = ec_sqrt(rows);
-  q[EC_SPREAD_AROUND * EC_FRAMES] = ec_sqrt(cols);
-  q[EC_SLANT * EC_FRAMES] = slant;
-  q[EC_LENGTH * EC_FRAMES] = ec_sqrt(larger);
-  q[EC_WIDTH_OF_ZONE * EC_FRAMES] = ec_sqrt(larger > 0.0 ? determinant / larger : 0.0);
+  q[EC_Q_SPREAD_ALONG * EC_FRAMES] = ec_sqrt(rows);
+  q[EC_Q_SPREAD_AROUND * EC_FRAMES] = ec_sqrt(cols);
+  q[EC_Q_SLANT * EC_FRAMES] = slant;
+  q[EC_Q_LENGTH * EC_FRAMES] = ec_sqrt(larger);
+  q[EC_Q_WIDTH * EC_FRAMES] = ec_sqrt(larger > 0.0 ? determinant / larger : 0.0);
 }
 
 /* The quantities of a zone in all felt frames. */
@@ -96,29 +96,29 @@ static void measure(uint32_t index) {
     double *q = columns + i;
     double force = (double)zone[2];
     double area = (double)zone[1];
-    q[EC_MAX_FORCE * EC_FRAMES] = (double)zone[0] / EC_SCALE;
-    q[EC_FORCE * EC_FRAMES] = force / EC_SCALE;
-    q[EC_AREA * EC_FRAMES] = area;
-    q[EC_PRESSURE * EC_FRAMES] = force / ((area > 1.0 ? area : 1.0) * EC_SCALE);
-    q[EC_ALONG_ROWS * EC_FRAMES] = force > 0.0 ? (double)zone[3] / force : EC_NAN;
-    q[EC_AROUND_COLS * EC_FRAMES] = force > 0.0 ? (double)zone[4] / force : EC_NAN;
-    q[EC_STIFFNESS * EC_FRAMES] =
+    q[EC_Q_MAX_FORCE * EC_FRAMES] = (double)zone[0] / EC_SCALE;
+    q[EC_Q_FORCE * EC_FRAMES] = force / EC_SCALE;
+    q[EC_Q_AREA * EC_FRAMES] = area;
+    q[EC_Q_PRESSURE * EC_FRAMES] = force / ((area > 1.0 ? area : 1.0) * EC_SCALE);
+    q[EC_Q_ALONG * EC_FRAMES] = force > 0.0 ? (double)zone[3] / force : EC_NAN;
+    q[EC_Q_AROUND * EC_FRAMES] = force > 0.0 ? (double)zone[4] / force : EC_NAN;
+    q[EC_Q_STIFFNESS * EC_FRAMES] =
         (force / EC_SCALE + EC_FORCE_FLOOR) / (felt[i]->motions[1] + EC_LENGTH_FLOOR);
     if (EC_SPREADS) spread(zone, q);
   }
-  if (EC_WRAPS) unwrap(columns + EC_AROUND_COLS * EC_FRAMES);
+  if (EC_WRAPS) unwrap(columns + EC_Q_AROUND * EC_FRAMES);
 }
 
 /* A value of a frame; not a number where it cannot be known. */
 static double value(const ec_feature *feature, uint32_t row, uint32_t frame) {
   switch (feature->quantity) {
-    case EC_REGION_PEAK: return felt[frame]->peak / EC_SCALE;
-    case EC_REGION_AREA: return felt[frame]->area;
-    case EC_CENTROID_MOTION: return felt[frame]->motions[0];
-    case EC_CENTRE_OF_FORCE_MOTION: return felt[frame]->motions[1];
-    case EC_TAXEL_FORCE: return felt[frame]->cells[row];
-    case EC_JOINT_ANGLE:
-    case EC_JOINT_CHANGE: return felt[frame]->joints[row];
+    case EC_Q_REGION_MAX_FORCE: return felt[frame]->peak / EC_SCALE;
+    case EC_Q_REGION_AREA: return felt[frame]->area;
+    case EC_Q_REGION_MOTION: return felt[frame]->motions[0];
+    case EC_Q_REGION_FORCE_MOTION: return felt[frame]->motions[1];
+    case EC_Q_TAXEL_FORCE: return felt[frame]->cells[row];
+    case EC_Q_JOINT_ANGLE:
+    case EC_Q_JOINT_CHANGE: return felt[frame]->joints[row];
     default: return columns[feature->quantity * EC_FRAMES + frame];
   }
 }
@@ -148,8 +148,8 @@ static void sample(const ec_feature *feature, uint32_t row, double step_s, doubl
   }
   double first = out[0];
   for (uint32_t i = 0; i < feature->samples; i++) {
-    if (feature->quantity == EC_TAXEL_FORCE) out[i] = out[i] / EC_SCALE;
-    if (feature->quantity == EC_JOINT_CHANGE) out[i] = out[i] - first;
+    if (feature->quantity == EC_Q_TAXEL_FORCE) out[i] = out[i] / EC_SCALE;
+    if (feature->quantity == EC_Q_JOINT_CHANGE) out[i] = out[i] - first;
   }
 }
 
@@ -160,9 +160,9 @@ static void transform(uint8_t kind, double *x, uint32_t size, double floor) {
     if (absolute(x[i]) > largest) largest = absolute(x[i]);
   }
   for (uint32_t i = 0; i < size; i++) {
-    if (kind == EC_LOG) {
+    if (kind == EC_T_LOG) {
       x[i] = x[i] + floor > 0.0 ? ec_log(x[i] + floor) : 0.0;
-    } else if (kind == EC_ROOT) {
+    } else if (kind == EC_T_SQRT) {
       double root = ec_sqrt(absolute(x[i]));
       x[i] = x[i] < 0.0 ? -root : root;
     } else {
@@ -184,11 +184,11 @@ static void to_rate(double *x, uint32_t n, double step_s) {
 
 /* The samples become others. */
 static double summary(uint8_t kind, double *x, uint32_t n) {
-  if (kind == EC_ROUGHNESS) {
+  if (kind == EC_S_ROUGHNESS) {
     for (uint32_t i = 0; i + 1 < n; i++) x[i] = absolute(x[i + 1] - x[i]);
     return summed(x, n - 1) / (n - 1);
   }
-  if (kind == EC_MEAN) return summed(x, n) / n;
+  if (kind == EC_S_MEAN) return summed(x, n) / n;
   double largest = 0.0;
   for (uint32_t i = 0; i < n; i++) {
     if (absolute(x[i]) > largest) largest = absolute(x[i]);
@@ -205,14 +205,14 @@ static double summary(uint8_t kind, double *x, uint32_t n) {
 static void block(const ec_feature *feature, double window_s, double *out) {
   uint32_t n = feature->samples;
   double step_s = window_s / (n - 1);
-  double *x = feature->summary <= EC_RATE ? out : samples;
+  double *x = feature->summary <= EC_S_RATE ? out : samples;
   for (uint32_t row = 0; row < feature->rows; row++) sample(feature, row, step_s, x + row * n);
   for (uint32_t i = 0; i < 3 && feature->transforms[i]; i++) {
     transform(feature->transforms[i], x, feature->rows * n, i ? 1.0 : feature->floor);
   }
   for (uint32_t row = 0; row < feature->rows; row++, x += n) {
-    if (feature->summary == EC_RATE) to_rate(x, n, step_s);
-    if (feature->summary > EC_RATE) *out++ = summary(feature->summary, x, n);
+    if (feature->summary == EC_S_RATE) to_rate(x, n, step_s);
+    if (feature->summary > EC_S_RATE) *out++ = summary(feature->summary, x, n);
   }
 }
 
@@ -289,11 +289,11 @@ void ec_vector(double window_s) {
     double *out = ec_arena;
     if (zone != EC_NO_ZONE) measure(i);
     for (const ec_feature *feature = ec_features; feature < ec_features + EC_FEATURES; feature++) {
-      uint32_t values = feature->summary > EC_RATE ? 1 : feature->samples;
+      uint32_t values = feature->summary > EC_S_RATE ? 1 : feature->samples;
       if (feature->zone == zone) {
         switch (feature->quantity) {
-          case EC_TAXEL_KERNELS: shares(&ec_taxel_kernels, window_s, out); break;
-          case EC_ZONE_KERNELS: shares(&ec_zone_kernels, window_s, out); break;
+          case EC_Q_TAXEL_KERNELS: shares(&ec_taxel_kernels, window_s, out); break;
+          case EC_Q_ZONE_KERNELS: shares(&ec_zone_kernels, window_s, out); break;
           default: block(feature, window_s, out);
         }
       }

@@ -114,16 +114,17 @@ extern const uint8_t ec_zone_names[]; /* EC_NO_ZONE comes last */
 extern const int16_t ec_cell_of_taxel[];
 extern const int16_t ec_kernel_cell_of_taxel[];
 
-/* model.c: the features */
+/* model.c: the features, by the names of edge/touch/measures.py */
 enum {
-  EC_MAX_FORCE, EC_FORCE, EC_AREA, EC_PRESSURE, EC_ALONG_ROWS, EC_AROUND_COLS, EC_SPREAD_ALONG,
-  EC_SPREAD_AROUND, EC_SLANT, EC_LENGTH, EC_WIDTH_OF_ZONE, EC_STIFFNESS, EC_ZONE_QUANTITIES,
-  EC_REGION_PEAK = EC_ZONE_QUANTITIES, EC_REGION_AREA, EC_CENTROID_MOTION,
-  EC_CENTRE_OF_FORCE_MOTION, EC_TAXEL_FORCE, EC_JOINT_ANGLE, EC_JOINT_CHANGE, EC_TAXEL_KERNELS,
-  EC_ZONE_KERNELS
+  EC_Q_MAX_FORCE, EC_Q_FORCE, EC_Q_AREA, EC_Q_PRESSURE, EC_Q_ALONG, EC_Q_AROUND, /* of a zone */
+  EC_Q_SPREAD_ALONG, EC_Q_SPREAD_AROUND, EC_Q_SLANT, EC_Q_LENGTH, EC_Q_WIDTH, EC_Q_STIFFNESS,
+  EC_QUANTITIES,
+  EC_Q_REGION_MAX_FORCE = EC_QUANTITIES, EC_Q_REGION_AREA, EC_Q_REGION_MOTION,
+  EC_Q_REGION_FORCE_MOTION, EC_Q_TAXEL_FORCE, EC_Q_JOINT_ANGLE, EC_Q_JOINT_CHANGE,
+  EC_Q_TAXEL_KERNELS, EC_Q_ZONE_KERNELS
 };
-enum { EC_NO_TRANSFORM, EC_LOG, EC_ROOT, EC_RELATIVE };
-enum { EC_COURSE, EC_RATE, EC_MEAN, EC_DEVIATION, EC_ROUGHNESS };
+enum { EC_T_NONE, EC_T_LOG, EC_T_SQRT, EC_T_RELATIVE };
+enum { EC_S_, EC_S_RATE, EC_S_MEAN, EC_S_DEVIATION, EC_S_ROUGHNESS };
 
 typedef struct {
   double floor; /* of the first transform, where it is a logarithm */
@@ -189,12 +190,12 @@ typedef struct {
   double rule_confidence; /* above 1: a fixed window */
   uint8_t rule_last;
   bool has_rule;
-  const uint8_t *indices[2]; /* of a product: the factors' label of each label */
   struct {
     uint32_t label, scores, distances, neighbours, label_distances; /* 0: none */
   } places;
   uint16_t labels;
   uint16_t k;
+  const uint8_t *indices[2]; /* of a product: the factors' label of each label */
   uint8_t factors[2];
   bool is_product;
 } ec_task;
