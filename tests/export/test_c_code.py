@@ -314,6 +314,27 @@ def test_the_sketch_suits_the_header(tmp_path, monkeypatch):
 
 
 @needs_gcc
+def test_a_frame_that_cannot_be_taken_in_is_an_error(tmp_path):
+    c_code.write(Model(demo.MODEL), tmp_path)
+    command = machine.compiled(tmp_path)
+    recording = touch()
+    t = recording.t
+    joints = recording.joints
+    for changed, error in (
+        (replace(recording, t=t / 3.0), "error -1"),  # more than there is room for
+        (replace(recording, t=np.where(t == t[5], -1.0, t)), "error -2"),
+        (replace(recording, t=np.where(t == t[5], np.nan, t)), "error -2"),
+        (
+            replace(recording, joints=np.where(t[:, None] == t[5], 2e6, joints)),
+            "error -3",
+        ),
+    ):
+        question = machine.about_recording(machine.EVENTS_OF_RECORDING, changed)
+        with pytest.raises(RuntimeError, match=error):
+            machine.ask(command, tmp_path, [question])
+
+
+@needs_gcc
 def test_options_that_change_bits_do_not_compile(tmp_path):
     c_code.write(Model(demo.MODEL), tmp_path)
     for option in ("-ffast-math", "-mfma"):

@@ -64,9 +64,15 @@ def compiled(folder, board=None):
 
 
 def ask(command, folder, questions):
-    """The numbers that answer questions."""
+    """The numbers that answer questions.
+
+    Raises:
+        RuntimeError: a frame was refused, or the program failed.
+    """
     (folder / "input.bin").write_bytes(b"".join(questions))
-    subprocess.run(command, cwd=folder, check=True, timeout=1800)
+    ended = subprocess.run(command, cwd=folder, stderr=subprocess.PIPE, text=True)
+    if ended.returncode or ended.stderr:
+        raise RuntimeError(ended.stderr or ended.returncode)
     return np.fromfile(folder / "output.bin")
 
 
