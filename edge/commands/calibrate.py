@@ -173,17 +173,20 @@ def moved_together(
 ) -> list[tuple[int, int]]:
     """Taxels (row, col) that rest as if they were touched.
 
-    They form a region, of which each has moved by more than the onset against the
-    former calibration, or, without one, stands out. A single taxel is named.
+    They form a region, of which each has moved by more than the threshold against the
+    former calibration, or, without one, stands out by more than the onset. A single
+    taxel is named.
     """
-    if file.layout.onset == 0:  # any noise would be above it
+    limit = file.layout.onset
+    if limit == 0:  # any noise would be above it
         return []
     if former is not None:
+        limit = file.layout.threshold_counts or limit
         change = np.abs(baseline.astype(np.int64) - former.baseline)
     else:
         change = standing_out(file, baseline)
     taxels: list[tuple[int, int]] = []
-    for region in find_regions(change, file.layout.onset, wraps=file.layout.wraps):
+    for region in find_regions(change, limit, wraps=file.layout.wraps):
         if region.area >= FEWEST_TOGETHER:
             taxels += places(region.mask)
         else:
@@ -196,6 +199,14 @@ def moved_together(
 
 def _apart(former: TaxelCalibration | None) -> str:
     return "beyond the others" if former is None else "off the former calibration"
+
+
+def _rest(file: SkinFile, measured: Measurement) -> str:
+    """Where the working taxels rest: half of them within this distance of the median."""
+    rest = measured.calibration.baseline.ravel()[list(file.served)].astype(np.int64)
+    middle = int(np.median(rest))
+    spread = int(np.median(np.abs(rest - middle)))
+    return f"{counted(len(rest), 'taxel')} rest at {middle} +- {spread}"
 
 
 def standing_out(file: SkinFile, baseline: Counts) -> Integers:
@@ -230,9 +241,9 @@ def check_rest(
     touched = moved_together(file, calibration.baseline, former)
     if touched:
         raise InputError(
-            f"{counted(len(touched), 'taxel')} side by side rest more than the onset of "
-            f"{file.layout.onset} counts {_apart(former)}, such as {list(touched[0])}, "
-            "as if something leant on the skin; keep everything off it, or use --force"
+            f"{counted(len(touched), 'taxel')} side by side rest {_apart(former)}, such "
+            f"as {list(touched[0])}, as if something leant on the skin; keep everything "
+            "off it, or use --force"
         )
     deaf = deaf_taxels(replace(file, calibration=calibration))
     if deaf:
@@ -323,7 +334,7 @@ def run(arguments: argparse.Namespace) -> int:
     Output.of(arguments).event(
         event,
         f"{arguments.skin}: calibrated from {measured.frames} frames; noise in counts: "
-        f"median {median:.1f}, largest {largest:.1f}. The old file is kept as "
-        f"{backup}.",
+        f"median {median:.1f}, largest {largest:.1f}. {_rest(file, measured)}: did "
+        f"nothing touch the skin? The old file is kept as {backup}.",
     )
     return 0

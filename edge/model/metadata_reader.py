@@ -114,7 +114,7 @@ def _task(table: ConfigTable) -> Task:
     task = Task(
         labels,
         k=table.whole("k", allowed=range(1, 1 << 31)),
-        components=table.whole("components", allowed=range(1, 1 << 31)),
+        components=table.whole("components", allowed=range(1 << 31)),
         scaling=table.text("scaling"),
         accuracy=table.number("accuracy", low=0.0, high=1.0),
         projection=table.text("projection"),

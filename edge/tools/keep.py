@@ -143,8 +143,7 @@ class Keeper:
         path = self._folder / f"{name}.npz"
         save(path, recording(frames, meta), lasting=False, overwrite=False)
         self.written.append(path)
-        with suppress(InputError), alone([self._folder]):
-            self._make_room()
+        self._make_room()
         if not path.exists():
             LOG.warning(
                 f"{self._folder}: touches are no longer kept, as labelled ones fill the "
@@ -159,11 +158,15 @@ class Keeper:
             with suppress(OSError):  # another program may be quicker
                 sizes[file] = file.stat().st_size
         excess = sum(sizes.values()) - self._most_bytes
-        for file, size in sizes.items():
-            if excess > 0 and not is_labelled(file):
-                with suppress(OSError):
-                    file.unlink()
-                    excess -= size
+        if excess <= 0:
+            return
+        # Who changes labels here keeps all; the next touch makes room.
+        with suppress(InputError), alone([self._folder]):
+            for file, size in sizes.items():
+                if excess > 0 and not is_labelled(file):
+                    with suppress(OSError):
+                        file.unlink()
+                        excess -= size
 
 
 def is_labelled(file: Path) -> bool:

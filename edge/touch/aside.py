@@ -8,6 +8,7 @@ import numpy as np
 
 from edge.arrays import Booleans, Floats, Integers
 from edge.touch.active import ActiveTaxels, Region
+from edge.touch.components import components_of
 from edge.touch.contact import Contact
 from edge.touch.frame import Frame
 from edge.touch.grid import grid
@@ -19,6 +20,8 @@ LONGEST_EARLY_S = 10.0
 """Seconds of first frames that are kept while what is set aside may be a touch."""
 LONG_S = 2.0
 """No touch is longer, or than a second more than contacts are followed."""
+FAR_LONGER = 4
+"""What lasts so many times as long is set aside even where it is not still."""
 CHECK_S = 0.25
 """Time between two looks at the counts."""
 MOVED_SHARE = 4
@@ -38,6 +41,10 @@ RESTLESS_SHARE = 0.012
 """The same over its count. A person's tremor of a twentieth has 0.008."""
 RESTLESS_LOOKS = 4
 """Looks in which a broken taxel is restless, less those in which it is not."""
+LONE_LOOKS = 4
+"""A taxel that lasts is named after so many looks in a small region."""
+LONGER_LOOKS = 2
+"""And so many looks later than it may be set aside, as it may be a touch all the same."""
 QUIET_LOOKS = 40
 """A broken taxel is followed again after so many looks without contact: ten seconds, as
 one that wanders comes back."""
@@ -48,8 +55,8 @@ class AsideTaxels:
 
     What is above the threshold in the first frame is set aside at once: it may be a
     stuck taxel, or a touch under way, which changes. Later what has been in contact for
-    longer than a touch lasts is set aside where it is still, or where a contact begins
-    beside it. A taxel that is restless, alone or with few, is broken.
+    longer than a touch lasts is set aside where it is still, where it lasts far longer,
+    or where a contact begins beside it. A taxel that is restless, alone or with few, is broken.
 
     Of a taxel that is set aside the level is subtracted, so that a touch on what leans
     there is felt. The level follows the highest count from look to look, and is gone
@@ -84,7 +91,6 @@ class AsideTaxels:
         self._next_s = frame.t
         is_first = begun_s.min() == frame.t
         self._began_s = frame.t if is_first else -math.inf
-        self._early_s = min(horizon_s, LONGEST_EARLY_S)
         self._early: list[tuple[Frame, ActiveTaxels]] = []
         """The first frames, while what is set aside may turn out to be a touch."""
         self._levels = zeros.copy()
@@ -110,6 +116,9 @@ class AsideTaxels:
         self._reference = zeros
         self._same = zeros
         """For how many looks each count has been near that reference."""
+        self._lone = zeros
+        """For how many looks each taxel has been in contact in a small region, for
+        longer than any large one."""
         self._long = 0
         """The taxels that have long been in contact, as bits of the grid."""
         self._former = 0
@@ -118,6 +127,7 @@ class AsideTaxels:
     def follow(self, frame: Frame, active: ActiveTaxels) -> list[Contact]:
         """As `ContactTracker.follow`, without what is set aside."""
         former = self._hidden
+        self.seen = frame
         self._watch(frame, active)
         shown = self._beside(frame)
         beside = active_taxels(shown, self._layout)
@@ -138,7 +148,8 @@ class AsideTaxels:
             over = self._tracker.end(beside)
         contacts = over + self._tracker.follow(shown, beside)
         self._keep_early(frame, active, contacts)
-        self.seen = frame if is_early else shown
+        if not is_early:
+            self.seen = shown
         return contacts
 
     def finish(self) -> list[Contact]:
@@ -161,7 +172,7 @@ class AsideTaxels:
         age_s = frame.t - self._began_s
         if contacts or not self._hidden.any():
             self._early = []
-        elif age_s == 0.0 or (self._early and age_s <= self._early_s):
+        elif age_s == 0.0 or (self._early and age_s <= LONGEST_EARLY_S):
             self._early.append((frame, active))
 
     def _is_touch(
@@ -196,8 +207,8 @@ class AsideTaxels:
 
     def _hides(self, active: ActiveTaxels) -> Region | None:
         """The active taxels that have long been in contact, where a contact begins
-        beside them."""
-        if not self._long:
+        beside them and would be hidden."""
+        if not self._long or self._tracker.max_contacts > 1:
             return None
         former = self._connected(active, self._long | self._former)
         if not active.has_other(former, self._layout.onset):
@@ -231,13 +242,14 @@ class AsideTaxels:
         in_contact = np.maximum(self._looks, 0) + 1
         self._looks = np.where(touched, in_contact, np.minimum(self._looks, 0) - 1)
         long = self._looks >= self._long_looks
-        still = long & self._is_still(touched)
+        far_longer = self._looks >= FAR_LONGER * self._long_looks
+        still = long & self._is_still(touched) | far_longer
         long &= ~still
         least = RESTLESS * self._layout.threshold_counts
         least = np.maximum(least, RESTLESS_SHARE * self._peaks)
         above = touched | (self._levels > 0)
         restless = above & (self._jumps > least * self._frames)
-        small = self._small(above, restless | long)
+        small = self._small(above)
         steps = np.where(restless & small, 1, -1)
         self._restless = np.maximum(self._restless + steps, 0)
         broken = self._broken | (self._restless >= RESTLESS_LOOKS)
@@ -248,8 +260,11 @@ class AsideTaxels:
         self._former = self._bits(self._looks > 1)
         # A piece of a larger contact is no lone taxel.
         of_large = self._looks.max(initial=0, where=touched & ~small)
+        is_lone = small & (self._looks > of_large)
+        self._lone = np.where(is_lone, self._lone + 1, 0)
         if t - self._began_s > EARLY_S:
-            self.aside = self._hidden | (long & small & (self._looks > of_large))
+            longer = self._looks >= self._long_looks + LONGER_LOOKS
+            self.aside = self._hidden | (longer & (self._lone >= LONE_LOOKS))
 
     def _follow_levels(self, at_rest: Booleans) -> None:
         falling = self._levels - self._levels // FALL_SHARE
@@ -266,19 +281,12 @@ class AsideTaxels:
         self._reference = np.where(same, self._reference, counts)
         return 2 * self._same >= self._long_looks
 
-    def _small(self, touched: Booleans, some: Booleans) -> Booleans:
-        """The taxels of those small regions that have one of some."""
-        within = self._bits(touched)
-        rest = self._bits(some)
-        small = 0
-        while rest:
-            region = rest & -rest
-            for _ in range(MOST_BROKEN):
-                region |= self._grid.neighbours(region) & within
-            if region.bit_count() <= MOST_BROKEN:
-                small |= region
-            rest &= ~region
-        return self._grid.unpack(small)
+    def _small(self, taxels: Booleans) -> Booleans:
+        """Those of the taxels that are in small regions."""
+        small = np.pad(taxels, ((0, 0), (0, 1)))
+        components = components_of(small, self._layout.wraps)
+        small[small] = components.areas[components.of_taxel] <= MOST_BROKEN
+        return small[:, :-1]
 
     def _bits(self, taxels: Booleans) -> int:
         return ActiveTaxels(taxels, 0, wraps=self._layout.wraps).bits

@@ -49,6 +49,7 @@ class ContactTracker:
     Attributes:
         layout: the skin, with its thresholds.
         horizon_s: seconds from onset after which a contact's series takes in no more.
+        max_contacts: how many are followed at once.
         motion_on_skin: measure motion on the skin for a contact whose first frame has
             no joint angles, where this is set; else its motion is unknown in frames
             without them.
@@ -94,7 +95,7 @@ class ContactTracker:
         self._debounce = debounce
         self._chain = chain
         self._measurer = Measurer(layout, features, joints)
-        self._max_contacts = max_contacts
+        self.max_contacts = max_contacts
         self.contacts: list[Contact] = []
         self._t = -math.inf
 
@@ -124,7 +125,7 @@ class ContactTracker:
             self._follow(contact, frame, active, shares.get(contact))
         contacts = list(self.contacts)
         for region in regions:
-            room = len(contacts) < self._max_contacts
+            room = len(contacts) < self.max_contacts
             is_new = region not in shares.values()
             if room and is_new and region.peak > self.layout.onset:
                 contact = self._begin(frame, region)
@@ -137,7 +138,7 @@ class ContactTracker:
         """End the contact, unless some of the last frame's region is still active;
         returned if it was confirmed. Of several contacts each ends by itself."""
         goes_on = self.region is not None and self.region.bits & active.bits
-        if goes_on or self._max_contacts > 1:
+        if goes_on or self.max_contacts > 1:
             return []
         contacts = self.contacts
         self.contacts = []
@@ -154,7 +155,7 @@ class ContactTracker:
     ) -> tuple[list[Region], dict[Contact, Region]]:
         """The regions to follow, the largest first, and {contact: the region that
         continues it}."""
-        if self._max_contacts > 1:
+        if self.max_contacts > 1:
             from edge.touch.several import shared  # few follow more than one
 
             return active.regions, shared(self.contacts, active.regions)

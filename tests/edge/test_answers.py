@@ -16,7 +16,10 @@ from tests.edge.touch.test_joint_doubts import RATE, series, stopped
 
 def decided(model, recording):
     """The decisions on a recording."""
-    events = Classifier(model).classify(recording)
+    return decisions(Classifier(model).classify(recording))
+
+
+def decisions(events):
     return [event for event in events if isinstance(event, Decided)]
 
 
@@ -55,10 +58,8 @@ def test_features_far_outside_of_training_flag_the_decision_or_give_no_label(
     labelled,
 ):
     recording = make_touch(kind="soft", seed=99)
-    layout = replace(recording.layout, counts_per_newton=scale)
-    classifier = Classifier(model, layout)
-    events = [event for frame in recording for event in classifier.push(frame)]
-    events = [event for event in events if isinstance(event, Decided)]
+    classifier = Classifier(model, replace(recording.layout, counts_per_newton=scale))
+    events = decisions(classifier._afresh(classifier.layout, recording))
     assert [e.flags for e in events] == [("out_of_range",)] * 2
     assert [bool(e.label) for e in events] == [labelled] * 2
     assert [bool(e.decision) for e in events] == [labelled] * 2

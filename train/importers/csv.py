@@ -42,6 +42,8 @@ from train.progress import say
 
 FEWEST_ROWS = 8
 """Rows of a trial from which on a column is seen to count them."""
+FEWEST_ALONE = 3
+"""Trials that may all have another label."""
 add_options = add_table_options
 
 
@@ -98,7 +100,7 @@ def _recorded(
         return
     folder = path if path.is_dir() else path.parent
     skin = json_table(folder / SKIN)
-    shape = _announced(usable[0], skin, options)
+    shape = _announced(usable, skin, options)
     rest = rest_of([trial.samples for trial in usable], options)
 
     def recorded(trial: Measured) -> Trial:
@@ -116,11 +118,12 @@ def _recorded(
 
 
 def _announced(
-    first: Measured,
+    usable: Sequence[Measured],
     skin: ConfigTable,
     options: TableOptions,
 ) -> tuple[int, int]:
     """The rows and columns of the skin; prints what was taken, once for all files."""
+    first = usable[0]
     taxels = len(first.meaning.taxels)
     shape_in_file = first.meaning.shape
     shape_in_file = shape_in_file or (skin.whole("rows", 1), skin.whole("cols", taxels))
@@ -129,6 +132,8 @@ def _announced(
     say("; ".join([text, *first.form]))
     if options.axes is not None:
         say(options.axes.text)
+    if len({str(trial.labels) for trial in usable}) == len(usable) > FEWEST_ALONE:
+        say("each trial has a label of its own; a labels.csv beside them gives others")
     return shape
 
 

@@ -44,6 +44,11 @@ ABOVE = re.compile(r"[#%]|sep=.\Z|\s*\Z", re.A)
 """How a comment, blank line or separator (of Excel) before the first row begins."""
 FRACTION = r"(?i)(?<![^\s;|\"])[+-]?\d*%s\d+(?:e[+-]?\d+)?(?![^\s;|\"])"
 """A cell with a fraction after a sign, where commas separate no cells."""
+THOUSANDS = re.compile(r"-?[1-9]\d{0,2}\.\d{3}")
+"""A number with a point for thousands, or with three decimals."""
+FEWEST_THOUSANDS = 3
+LOOKED_AT = 2000
+"""Rows that are looked at for such numbers."""
 LONGEST_LINE = 4 << 20
 
 
@@ -201,6 +206,7 @@ def read_text(path: Path) -> Table:
         if text.mark not in ("", ","):
             form.append(f"separated by {MARKS[text.mark]}")
         header = _header(text)
+        _refuse_thousands(text)
         return Table(
             str(path),
             _parsed(text, header),
@@ -342,6 +348,26 @@ def _is_number(text: str) -> bool:
         float(text.replace(",", ".", 1))
         return True
     return False
+
+
+def _refuse_thousands(text: _Text) -> None:
+    """Refuse points for thousands: all fractions of a column have three decimals, and
+    numbers below a thousand have none.
+
+    Raises:
+        InputError: a column has such numbers.
+    """
+    lines = text.body.split("\n", LOOKED_AT)[:LOOKED_AT]
+    for cells in zip(*(row for _, row in _rows(lines, text.mark)), strict=False):
+        column = " ".join(cells)
+        fractions = re.findall(r"\S*\.\S*", column)
+        whole = re.search(r"(?<!\S)[1-9]\d\d(?!\S)", column)
+        are_alike = all(map(THOUSANDS.fullmatch, fractions))
+        if whole and are_alike and len(fractions) >= FEWEST_THOUSANDS:
+            raise InputError(
+                f"has numbers with a point for thousands, such as {fractions[0]} beside "
+                f"{whole[0]}; save it without them"
+            )
 
 
 def _parsed(text: _Text, header: _Header) -> pd.DataFrame:

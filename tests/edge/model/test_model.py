@@ -200,7 +200,6 @@ REFUSED = {
     category(
         components=10**9
     ): "task 'category' has 1000000000 components of 120 features",
-    category(components=0): "components must be a whole number from 1 to",
     meta(tracking={"debounce": 0}): "debounce must be a whole number from 1 to 100",
     edited(
         lambda m: m["skin"].update(counts_per_newton=1e-300)

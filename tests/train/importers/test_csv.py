@@ -166,6 +166,12 @@ def test_joint_angles_in_rows_of_their_own_are_interpolated(folder, capsys):
     assert "lacks joint angles for 1 of 2 frames" in capsys.readouterr().out
 
 
+def test_labels_that_tell_all_trials_apart_are_said(folder, capsys):
+    put(folder, {f"acrylic_{n}_hold.csv": "t,s1,s2\n0,1,2\n1,3,4\n" for n in range(4)})
+    imported(folder, "--time-unit", "s")
+    assert "each trial has a label of its own" in capsys.readouterr().out
+
+
 def test_joints_fractions_gaps_and_files_beside(folder):
     rows = [[0.5 * i, "nan", 90, -90] for i in range(3)]
     files = {

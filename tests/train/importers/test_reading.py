@@ -95,6 +95,18 @@ def test_a_column_that_only_a_comma_at_the_end_makes_is_no_column(tmp_path):
     assert rows_of(read(tmp_path, "t,p1\n0,1,\n1,2,\n")) == [[0, 1], [1, 2]]
 
 
+def test_points_for_thousands_are_refused(tmp_path):
+    path = tmp_path / "a.csv"
+    rows = ["8.001;952", "8.002;1.027", "8.003;1.104", "8.004;998"]
+    path.write_text("\n".join(["t;s", *rows]))
+    assert read_text(path).data["s"].tolist() == [952, 1.027, 1.104, 998]
+    path.write_text("\n".join(["t;s", *rows, "8.005;1.5"]))
+    assert len(read_text(path).data) == 5
+    path.write_text("\n".join(["t;s", *rows, "8.005;1.312"]))
+    with pytest.raises(InputError, match=r"thousands, such as 1.027 beside 952; save"):
+        read_text(path)
+
+
 def test_an_empty_cell_is_missing(tmp_path):
     assert np.isnan(rows_of(read(tmp_path, "t,p1\n0,\n1,2\n"))[0][1])
 
