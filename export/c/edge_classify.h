@@ -64,6 +64,9 @@ int ec_push(
     const uint16_t *counts, const bool *valid, double t_s, const double *joints,
     ec_event events[EC_MOST_EVENTS]);
 
+/* Whether a contact is under way, so that no baseline may follow. */
+bool ec_is_touched(void);
+
 /* End the stream: tasks that wait are decided, flagged EC_SHORT. */
 int ec_finish(ec_event events[EC_MOST_EVENTS]);
 

@@ -12,7 +12,7 @@ from edge.events import Decided, Onset, Release
 from edge.touch.first_contact import first_contact
 
 HERE = Path(__file__).parent
-VECTOR, VECTORS_OF_RECORDING, EVENTS_OF_RECORDING = range(3)
+VECTOR, VECTORS_OF_RECORDING, EVENTS_OF_RECORDING, BASELINE = range(4)
 WARNINGS = "-Wall -Wextra -Werror -Wconversion -Wdouble-promotion -pedantic"
 COMMON = f"-std=c99 -O2 -ffp-contract=off {WARNINGS}".split()
 SANITIZED = "-fsanitize=undefined,address -fno-sanitize-recover=all".split()
