@@ -228,6 +228,8 @@ void ec_begin(void) {
   last_s = -EC_INFINITY;
 }
 
+bool ec_is_touched(void) { return ec_now.under_way && !ec_now.ended; }
+
 static bool usable(double x) { return x >= -1e6 && x <= 1e6; }
 
 int ec_push(

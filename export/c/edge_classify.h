@@ -1,6 +1,7 @@
 /* Decides what a robot's skin touches, from raw counts, with the bits of `edge-classify replay`.
-   One contact at a time; no heap, no recursion, no mathematical library. Its RAM is static:
-   sizeof ec_now + sizeof ec_arena + 7 bytes a taxel, which `edge-classify export --c` prints.
+   One contact at a time; no heap, no recursion, no mathematical library. Its RAM is static: the
+   sizes of ec_now and ec_arena and 6 bytes a taxel, which `edge-classify export --c` prints, and a
+   stack of less than 2 kB.
 
    Compile every .c file of this folder with -std=c99 -ffp-contract=off. */
 #ifndef EDGE_CLASSIFY_H
@@ -62,6 +63,9 @@ void ec_begin(void);
 int ec_push(
     const uint16_t *counts, const bool *valid, double t_s, const double *joints,
     ec_event events[EC_MOST_EVENTS]);
+
+/* Whether a contact is under way, so that no baseline may follow. */
+bool ec_is_touched(void);
 
 /* End the stream: tasks that wait are decided, flagged EC_SHORT. */
 int ec_finish(ec_event events[EC_MOST_EVENTS]);

@@ -31,16 +31,16 @@ typedef struct {
 static component flood(
     uint32_t seed, uint16_t label, const ec_set active, const uint16_t *counts,
     const ec_set previous) {
-  component found = {0, 0, 0};
+  component whole = {0, 0, 0};
   uint32_t left = 0;
   labels[seed] = label;
   waiting[left++] = (uint16_t)seed;
   while (left > 0) {
     uint32_t taxel = waiting[--left];
     uint32_t beside[4];
-    found.area++;
-    found.overlap += previous[taxel];
-    if (counts[taxel] > found.peak) found.peak = counts[taxel];
+    whole.area++;
+    whole.overlap += previous[taxel];
+    if (counts[taxel] > whole.peak) whole.peak = counts[taxel];
     for (uint32_t i = neighbours(taxel, beside); i-- > 0;) {
       if (active[beside[i]] && !labels[beside[i]]) {
         labels[beside[i]] = label;
@@ -48,7 +48,7 @@ static component flood(
       }
     }
   }
-  return found;
+  return whole;
 }
 
 /* The largest area comes first, then the larger overlap with the region followed so far, then the

@@ -13,6 +13,8 @@ from edge import demo
 from edge.errors import InputError
 from edge.model.model import Model
 from edge.recording import Recording, load
+from edge.skin.decoder import Baseline
+from edge.skin.file import Signal
 from edge.touch import measures
 from edge.touch.feature import KERNELS
 from edge.touch.kernels import KernelTable, channels_of
@@ -311,6 +313,50 @@ def test_the_sketch_suits_the_header(tmp_path, monkeypatch):
     command = ["g++", "-std=c++11", "-Wall", "-fsyntax-only", f"-I{tmp_path}", "-xc++"]
     compiled = ended(*command, sketch)
     assert compiled.returncode == 0, compiled.stderr
+
+
+@needs_gcc
+def test_the_baseline_follows_as_pythons(tmp_path):
+    rng = np.random.default_rng(9)
+    layout = Model(demo.MODEL).info.layout
+    walk = rng.integers(-4, 5, (80, *layout.shape)).cumsum(axis=0) + 30000
+    frames = np.clip(walk + np.arange(80)[:, None, None], 0, 65535).astype(np.uint16)
+    valid = rng.random(frames.shape) < 0.9
+    recording = Recording(np.arange(80.0), frames, valid=valid)
+    signal = Signal(
+        drift_counts_per_s=300 / 4096, drift_limit_counts=20, dead_band_counts=3
+    )
+    baseline = Baseline(signal, 1.0, frames[0].ravel(), sign=-1)
+    expected = []
+    for raw, readable in zip(frames, valid, strict=True):
+        expected.append(baseline.above(raw.ravel()))
+        baseline.follow(raw.ravel(), readable.ravel())
+    c_code.write(Model(demo.MODEL), tmp_path)
+    question = machine.about_recording(machine.BASELINE, recording)
+    answer = machine.ask(machine.compiled(tmp_path), tmp_path, [question])
+    assert answer.tolist() == np.concatenate(expected).tolist()
+    assert np.unique(answer).size > 10
+
+
+@needs_gcc
+def test_a_frame_that_cannot_be_taken_in_is_an_error(tmp_path):
+    c_code.write(Model(demo.MODEL), tmp_path)
+    command = machine.compiled(tmp_path)
+    recording = touch()
+    t = recording.t
+    joints = recording.joints
+    for changed, error in (
+        (replace(recording, t=t / 3.0), "error -1"),  # more than there is room for
+        (replace(recording, t=np.where(t == t[5], -1.0, t)), "error -2"),
+        (replace(recording, t=np.where(t == t[5], np.nan, t)), "error -2"),
+        (
+            replace(recording, joints=np.where(t[:, None] == t[5], 2e6, joints)),
+            "error -3",
+        ),
+    ):
+        question = machine.about_recording(machine.EVENTS_OF_RECORDING, changed)
+        with pytest.raises(RuntimeError, match=error):
+            machine.ask(command, tmp_path, [question])
 
 
 @needs_gcc

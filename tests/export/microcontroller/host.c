@@ -2,9 +2,10 @@
    graph's outputs, recordings by their vectors or their events. */
 #include <stdio.h>
 
+#include "baseline.h"
 #include "internal.h"
 
-enum { VECTOR, VECTORS_OF_RECORDING, EVENTS_OF_RECORDING };
+enum { VECTOR, VECTORS_OF_RECORDING, EVENTS_OF_RECORDING, BASELINE };
 
 typedef struct {
   double t;
@@ -94,6 +95,20 @@ static void classify(uint32_t frames) {
   give(end, 9);
 }
 
+/* Raw counts, which the baseline follows by steps of 300 within 20 counts, from those of the first
+   frame; a touch lowers them, beyond a dead band of 3. */
+static void follow(uint32_t frames) {
+  static ec_baseline taxels[EC_ROWS * EC_COLS];
+  static uint16_t counts[EC_ROWS * EC_COLS];
+  for (uint32_t i = 0; i < frames; i++) {
+    frame next = next_frame();
+    if (i == 0) ec_baseline_begin(taxels, EC_ROWS * EC_COLS, next.counts, 20);
+    ec_baseline_above(taxels, EC_ROWS * EC_COLS, next.counts, -1, 3, counts);
+    ec_baseline_follow(taxels, EC_ROWS * EC_COLS, next.counts, next.valid, 300);
+    for (uint32_t j = 0; j < EC_ROWS * EC_COLS; j++) give((double[]){counts[j]}, 1);
+  }
+}
+
 int main(void) {
   uint32_t question[2];
   input = fopen("input.bin", "rb");
@@ -106,6 +121,8 @@ int main(void) {
       give_outputs();
     } else if (question[0] == VECTORS_OF_RECORDING) {
       give_vectors(question[1]);
+    } else if (question[0] == BASELINE) {
+      follow(question[1]);
     } else {
       classify(question[1]);
     }

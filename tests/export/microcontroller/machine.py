@@ -12,7 +12,7 @@ from edge.events import Decided, Onset, Release
 from edge.touch.first_contact import first_contact
 
 HERE = Path(__file__).parent
-VECTOR, VECTORS_OF_RECORDING, EVENTS_OF_RECORDING = range(3)
+VECTOR, VECTORS_OF_RECORDING, EVENTS_OF_RECORDING, BASELINE = range(4)
 WARNINGS = "-Wall -Wextra -Werror -Wconversion -Wdouble-promotion -pedantic"
 COMMON = f"-std=c99 -O2 -ffp-contract=off {WARNINGS}".split()
 SANITIZED = "-fsanitize=undefined,address -fno-sanitize-recover=all".split()
@@ -64,9 +64,15 @@ def compiled(folder, board=None):
 
 
 def ask(command, folder, questions):
-    """The numbers that answer questions."""
+    """The numbers that answer questions.
+
+    Raises:
+        RuntimeError: a frame was refused, or the program failed.
+    """
     (folder / "input.bin").write_bytes(b"".join(questions))
-    subprocess.run(command, cwd=folder, check=True, timeout=1800)
+    ended = subprocess.run(command, cwd=folder, stderr=subprocess.PIPE, text=True)
+    if ended.returncode or ended.stderr:
+        raise RuntimeError(ended.stderr or ended.returncode)
     return np.fromfile(folder / "output.bin")
 
 

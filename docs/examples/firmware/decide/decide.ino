@@ -8,6 +8,7 @@
 #include <Wire.h>
 
 extern "C" {
+#include "baseline.h"
 #include "edge_classify.h"
 }
 
@@ -15,10 +16,11 @@ const uint8_t PAD = 0x5A;       // the MPR121's address
 const uint8_t FILTERED = 0x04;  // 12 values of 10 bits, two bytes each
 const uint8_t RUN = 0x5E;       // ECR: electrodes that are measured
 const uint16_t REST_FRAMES = 32;
+const int32_t STEP = 820;  // 20 counts a second, at 100 frames a second
 
 static_assert(EC_ROWS * EC_COLS == 12, "export a model for 1 x 12 taxels");
 
-uint16_t rest[12];  // the counts without a touch
+ec_baseline taxels[12];
 
 bool read_pad(uint16_t values[12]) {
   Wire.beginTransmission(PAD);
@@ -48,7 +50,8 @@ void setup() {
     n++;
     delay(10);
   }
-  for (int i = 0; i < 12; i++) rest[i] = uint16_t(sums[i] / REST_FRAMES);
+  for (int i = 0; i < 12; i++) values[i] = uint16_t(sums[i] / REST_FRAMES);
+  ec_baseline_begin(taxels, 12, values, 2000);
   ec_begin();
 }
 
@@ -59,7 +62,8 @@ void loop() {
   const double t_s = millis() / 1e3;
   if (read_pad(values)) {
     // A touch lowers the MPR121's values; counts rise with it.
-    for (int i = 0; i < 12; i++) counts[i] = values[i] < rest[i] ? rest[i] - values[i] : 0;
+    ec_baseline_above(taxels, 12, values, -1, 4, counts);
+    if (!ec_is_touched()) ec_baseline_follow(taxels, 12, values, nullptr, STEP);
     const int count = ec_push(counts, nullptr, t_s, nullptr, events);
     for (int i = 0; i < count; i++) {
       const ec_event &event = events[i];
