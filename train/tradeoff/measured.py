@@ -10,7 +10,6 @@ from train.tradeoff.board import Board
 from train.tradeoff.choices import Points
 from train.tradeoff.commands import Commands
 from train.tradeoff.early import StoppingComparison
-from train.tradeoff.shear import Compared
 
 
 @dataclass(frozen=True)
@@ -32,7 +31,6 @@ class Measured:
         notes: sentences of the choice.
         wrong, second: an owner's price of a wrong decision, and of waiting for a
             second.
-        shear: the choices with shear and without; None of recordings without it.
     """
 
     y: Labels
@@ -46,7 +44,6 @@ class Measured:
     notes: Sequence[str] = ()
     wrong: float = 10.0
     second: float = 1.0
-    shear: Compared | None = None
 
     @property
     def after_s(self) -> float:

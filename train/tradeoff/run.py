@@ -2,7 +2,7 @@
 board."""
 
 import json
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -12,15 +12,14 @@ from edge.errors import InputError
 from edge.recording import Recording
 from edge.writing import write_whole
 from train.data.dataset import DataSet, read
-from train.data.groups import LEAVE_OUT
 from train.report.page import write
 from train.report.section import Row, Section, counted
 from train.report.work import Workers
 from train.simulate import scene as scenes
-from train.tradeoff import answer, costs, early, shear
+from train.tradeoff import answer, costs, early
 from train.tradeoff import board as boards
 from train.tradeoff.breakaway import breakaway_times
-from train.tradeoff.choices import WINDOWS_S, Points, choices_at, prepared
+from train.tradeoff.choices import WINDOWS_S, choices_at, prepared
 from train.tradeoff.commands import Commands
 from train.tradeoff.front import ParetoFront
 from train.tradeoff.measured import Measured
@@ -109,9 +108,6 @@ def tradeoff(data: Sequence[str], out: Path, board_path: str, options: Options) 
         jobs=options.jobs,
         certify=True,
     )
-    sheared = None
-    if dataset.layout.axes:
-        sheared = _sheared(dataset, points, comparisons, options)
     rows = costs.measure(raw, dataset, points, rate, workers, quick=quick)
     notes = list(ready.notes)
     if quick:
@@ -127,7 +123,6 @@ def tradeoff(data: Sequence[str], out: Path, board_path: str, options: Options) 
         costs=rows,
         wrong=options.wrong,
         second=options.second,
-        shear=sheared,
         commands=_commands(data, out, board_path, options),
         notes=notes,
     )
@@ -162,29 +157,6 @@ def _rate_hz(recordings: Sequence[Recording]) -> float:
     return float(np.median([1.0 / step_s for step_s in steps_s if step_s > 0.0]))
 
 
-def _sheared(
-    dataset: DataSet,
-    points: Points,
-    comparisons: Mapping[str, early.StoppingComparison],
-    options: Options,
-) -> shear.Compared:
-    """The choices with shear, measured already for known objects, beside those
-    without."""
-    quick = options.quick
-    jobs = options.jobs
-    unseen_result = early.compare_stopping(
-        dataset,
-        WINDOWS_S,
-        leave_out=LEAVE_OUT,
-        quick=quick,
-        jobs=jobs,
-        certify=True,
-    )
-    by_kind = {shear.KNOWN: comparisons, shear.UNSEEN: unseen_result}
-    sheared = shear.Answers(points, by_kind)
-    return shear.compared(dataset, sheared, Workers(jobs), quick=quick)
-
-
 def _quick_note(rows: Sequence[Row], task: str) -> str:
     """A sentence on what a choice among all candidates gains."""
     (every,) = (row for row in rows if row["change"] == costs.ALL)
@@ -217,6 +189,4 @@ def _write(measured: Measured, out: Path, contacts: str) -> Path:
         f"save. It is based on {contacts}."
     ]
     sections = [make(measured) for make in SECTIONS]
-    if measured.shear is not None:
-        sections.insert(1, shear.section(measured.shear))
     return write(out, "Accuracy against time", lead, sections)
