@@ -21,8 +21,6 @@ class Measured:
         board: figures of the machine that decides.
         wire_s: from the end of the window until its last frame is read; None where the
             recordings do not tell the skin's wires.
-        breakaways: {object: seconds} until static friction breaks; empty without a
-            scene.
         points: the choice at each window.
         comparisons: {task: early decisions compared with fixed windows}.
         costs: a row for each change of the choice at the usual window
@@ -36,7 +34,6 @@ class Measured:
     y: Labels
     board: Board
     wire_s: float | None
-    breakaways: Mapping[str, float]
     points: Points
     comparisons: Mapping[str, StoppingComparison]
     costs: Sequence[Row]

@@ -15,10 +15,8 @@ from train.data.dataset import DataSet, read
 from train.report.page import write
 from train.report.section import Row, Section, counted
 from train.report.work import Workers
-from train.simulate import scene as scenes
 from train.tradeoff import answer, costs, early
 from train.tradeoff import board as boards
-from train.tradeoff.breakaway import breakaway_times
 from train.tradeoff.choices import WINDOWS_S, choices_at, prepared
 from train.tradeoff.commands import Commands
 from train.tradeoff.front import ParetoFront
@@ -56,8 +54,6 @@ class Options:
     """What a trade-off is measured with.
 
     Attributes:
-        scene: the file of the scene that the recordings were simulated from, for the
-            physical limit.
         task: of front.json; by default `category`, or else the first.
         wrong, second: an owner's price of a wrong decision, and of waiting for a
             second.
@@ -65,7 +61,6 @@ class Options:
         jobs: processes.
     """
 
-    scene: str | None = None
     task: str | None = None
     wrong: float = 10.0
     second: float = 1.0
@@ -91,7 +86,6 @@ def tradeoff(data: Sequence[str], out: Path, board_path: str, options: Options) 
     """
     workers = Workers(options.jobs)
     board = boards.read(board_path)
-    scene = None if options.scene is None else scenes.load(options.scene)
     raw = read(data, progress=True)
     boards.check(board, board_path, raw.digest)
     quick = options.quick
@@ -117,7 +111,6 @@ def tradeoff(data: Sequence[str], out: Path, board_path: str, options: Options) 
         y={task: dataset.labels(task) for task in order},
         board=board,
         wire_s=wire_time_s(raw.recordings, dataset.layout, rate),
-        breakaways={} if scene is None else breakaway_times(scene),
         points=points,
         comparisons=comparisons,
         costs=rows,
@@ -126,8 +119,7 @@ def tradeoff(data: Sequence[str], out: Path, board_path: str, options: Options) 
         commands=_commands(data, out, board_path, options),
         notes=notes,
     )
-    simulated = "" if scene is None else f", simulated from the scene {scene.name}"
-    report = _write(measured, out, counted(len(dataset.trials), "contact") + simulated)
+    report = _write(measured, out, counted(len(dataset.trials), "contact"))
     front = ParetoFront.of(points, main, measured.after_s, quick=quick)
     _write_front(front, out / "front.json", dataset.digest)
     return report
@@ -144,7 +136,6 @@ def _commands(data: Sequence[str], out: Path, board: str, options: Options) -> C
     return Commands(
         data=tuple(map(str, data)),
         out=out,
-        scene=options.scene,
         quick=options.quick,
         board=Path(board),
         task=options.task,
