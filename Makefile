@@ -178,7 +178,7 @@ docs/touches.png docs/touches-dark.png: $(READY)
 
 docs/touch.png: $(READY)
 	$(BIN)/python -m train simulate train/scenes/demo.toml --out $(OUT)/picture --seed 2012 --trials 1
-	$(BIN)/python -m train show $(OUT)/picture/cardboard-box-movable-00.npz --scene --out $@
+	$(BIN)/python -m train show $(OUT)/picture/cardboard-box-movable-00.npz --out $@
 
 BENCHVENV := $(VENV)/.bench
 
@@ -220,7 +220,7 @@ tradeoff: $(READY)
 	$(BIN)/python -m export --data $(RECORDINGS) --out $(OUT)/tradeoff --quick
 	$(BIN)/edge-classify bench --model $(OUT)/tradeoff/model.onnx --out $(BOARD)
 endif
-	$(BIN)/python -m train tradeoff --data $(RECORDINGS) $(STUDIED) --board $(BOARD) \
+	$(BIN)/python -m train tradeoff --data $(RECORDINGS) --board $(BOARD) \
 	  --out $(OUT)/tradeoff $(TRADEOFF)
 
 # The site, with the Python reference from the docstrings; a broken link is an error.

@@ -29,9 +29,7 @@ def compared(seed, folder, jobs):
     data = folder / str(seed)
     run.write(scene.load(SCENE, seed=seed), data)
     dataset = followed(read([str(data)]))
-    workers = Workers(jobs)
-    sheared = shear.answers(dataset, WINDOWS_S, workers)
-    return shear.compared(dataset, sheared, workers)
+    return shear.compared(dataset, WINDOWS_S, Workers(jobs))
 
 
 def gain(runs, task, window, kind):

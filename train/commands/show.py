@@ -1,9 +1,8 @@
 """Draw recordings.
 
 Draws a recording: frames over time with the contact region, and the three features;
-with --scene, the arm and the contact from the side; with --model, its curves over those
-of the nearest training trials. Draws several recordings side by side, with the
-decisions of --model.
+with --model, its curves over those of the nearest training trials. Draws several
+recordings side by side, with the decisions of --model.
 """
 
 import argparse
@@ -33,20 +32,9 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         help="the picture to write (default: beside the recording)",
     )
     option(
-        "--scene",
-        action="store_true",
-        help="sketch the arm and the contact from the side too",
-    )
-    option(
         "--dark",
         action="store_true",
         help="draw several recordings for a dark page",
-    )
-    option(
-        "--threshold",
-        type=int,
-        metavar="COUNTS",
-        help="threshold, instead of the skin's",
     )
 
 
@@ -58,7 +46,8 @@ def run(arguments: argparse.Namespace) -> int:
     first = arguments.recording[0]
     out = Path(arguments.out or Path(first).with_suffix(".png"))
     several = len(arguments.recording) > 1
-    _check(arguments, several)
+    if arguments.dark and not several:
+        raise InputError("--dark is for several recordings")
     model = None if arguments.model is None else Model(arguments.model)
     if several:
         from train.draw import comparison
@@ -78,25 +67,6 @@ def run(arguments: argparse.Namespace) -> int:
     else:
         from train.draw.recording import draw
 
-        draw(
-            load(first),
-            out,
-            where=first,
-            scene=arguments.scene,
-            threshold=arguments.threshold,
-        )
+        draw(load(first), out, where=first)
     print(out)
     return 0
-
-
-def _check(arguments: argparse.Namespace, several: bool) -> None:
-    """Refuse options that do not go together."""
-    details = arguments.scene or arguments.threshold is not None
-    if arguments.dark and not several:
-        raise InputError("--dark is for several recordings")
-    if several and details:
-        raise InputError("--scene and --threshold are for a single recording")
-    if arguments.model is not None and details:
-        raise InputError(
-            "--model draws other curves than --scene and --threshold; give one of them"
-        )

@@ -37,10 +37,6 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         help="your price of a wrong decision and of a second's wait: the report names the window "
         "of least cost (default: wrong=10,second=1)",
     )
-    option(
-        "--scene",
-        help="the scene that they were simulated from: adds the physical limit",
-    )
     text = "try few candidates at each window, and say by how much that differs"
     option("--quick", action="store_true", help=text)
     option("--task", help="task of front.json (default: category, or else the first)")
@@ -85,7 +81,6 @@ def run(arguments: argparse.Namespace) -> int:
     if arguments.board is None:
         raise InputError("give --board board.json, which `edge-classify bench` writes")
     options = Options(
-        scene=arguments.scene,
         task=arguments.task,
         wrong=arguments.cost[0],
         second=arguments.cost[1],

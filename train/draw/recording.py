@@ -1,5 +1,4 @@
-"""Draw a recording: its frames with the contact region, the three features, and the
-arm."""
+"""Draw a recording: its frames with the contact region, and the three features."""
 
 from pathlib import Path
 from typing import Any
@@ -9,7 +8,6 @@ import numpy as np
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from edge.errors import InputError
 from edge.recording import Recording
 from edge.touch.active import Region
 from edge.touch.contact import FeatureSeries
@@ -21,8 +19,6 @@ from edge.touch.region import largest_region
 from edge.touch.track import ContactTracker
 from edge.writing import write_whole
 from train.data.arms import arm_of
-from train.data.contacts import with_thresholds
-from train.draw.sketch import draw_side
 
 FRAMES = 6
 ARROW = 2.0
@@ -39,32 +35,24 @@ def draw(
     out: Path,
     *,
     where: str = "recording",
-    scene: bool = False,
-    threshold: int | None = None,
 ) -> None:
     """Draw a recording and save the picture as PNG.
 
     Args:
         where: name of the recording in errors.
-        scene: add the arm and the contact, seen from the side.
-        threshold: counts above which a taxel is in contact; the recording's own where
-            None.
 
     Raises:
-        InputError: a sketch is asked for without a known arm, or `out` cannot be
-            written.
+        InputError: `out` cannot be written.
     """
-    layout = with_thresholds(recording.layout, threshold, None)
+    layout = recording.layout
     chain = arm_of(recording, where)
     if chain is not None:
         recording = recording.for_joints(chain.names)
-    if scene and chain is None:
-        raise InputError(f"{where}: has no joint angles, so there is no arm to sketch")
     contact = first_contact(
         recording, ContactTracker(layout, chain=chain, horizon_s=HORIZON_S)
     )
     onset, series = contact or (float(recording.t[0]), None)
-    heights = [1.7, 3.2, 4.0][: 3 if scene else 2]
+    heights = [1.7, 3.2]
     figure = Figure(figsize=(15.0, 1.2 + sum(heights)), layout="constrained")
     figure.suptitle(_title(recording))
     grid = figure.add_gridspec(len(heights), FRAMES, height_ratios=heights)
@@ -73,9 +61,6 @@ def draw(
     for i, feature in enumerate(FEATURES):
         axis = figure.add_subplot(grid[1, third * i : third * (i + 1)])
         _curve(axis, feature, units(layout)[feature], series)
-    if scene and chain is not None:
-        side = figure.add_subplot(grid[2, 1:-1])
-        draw_side(side, recording, chain, layout, onset)
     with write_whole(out) as file:
         figure.savefig(file, format="png", dpi=110)
 

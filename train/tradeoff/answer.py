@@ -121,7 +121,7 @@ def prices(measured: Measured) -> Section:
 
 
 def reasons(measured: Measured) -> Section:
-    """The physical reason for the time, and the commands that export the models."""
+    """What the time is spent on, and the commands that export the models."""
     wire = "The recordings do not name the skin's wires, whose time is ignored. The"
     if measured.wire_s is not None:
         wire = f"The last frame takes {1e3 * measured.wire_s:.1f} ms over the wire. The"
@@ -130,14 +130,6 @@ def reasons(measured: Measured) -> Section:
         f"{wire} arithmetic of a decision takes "
         f"{1e3 * measured.board.arithmetic_s:.2f} ms on {measured.board.name}."
     ]
-    slow = sorted(measured.breakaways.items(), key=lambda item: -item[1])
-    if slow:
-        notes.append(
-            "Physics sets a lower limit. A movable object stands still, and cannot be "
-            "distinguished from a fixed one, until the arm pushes harder than static friction "
-            "holds. The table gives this time, mu_s m g / (k v), for the middle of "
-            "each object's friction and mass."
-        )
     commands = measured.commands
     windows = ", ".join(f"{window:g}" for window in measured.points)
     kind = "quick choice" if commands.quick else "choice of `make export`"
@@ -156,11 +148,7 @@ def reasons(measured: Measured) -> Section:
         "cannot certify, and names the smallest rate that they can. Leave a margin "
         "above that rate. Early decisions were not measured on unseen objects.",
     ]
-    rows: list[Row] = [
-        {"object": name, "time until it moves s": round(at, 2)} for name, at in slow
-    ]
-    table = Table("breakaway", "Time until each movable object moves", rows)
-    return Section("Reasons and commands", notes, [table])
+    return Section("Reasons and commands", notes)
 
 
 GLOSSARY = {

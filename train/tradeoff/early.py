@@ -6,14 +6,14 @@ from typing import Any
 
 import numpy as np
 
-from edge.arrays import Booleans, Floats, Integers
+from edge.arrays import Booleans, Floats
 from edge.early import fastest
 from edge.model.info import Stopping
 from edge.statistics import Z
 from train.choose.evaluate import VARIANCE, Promise, Result
 from train.data.dataset import DataSet
-from train.data.folds import finest, group_folds, stratified_folds
-from train.data.groups import TRIAL, groupable
+from train.data.folds import finest, stratified_folds
+from train.data.groups import TRIAL
 from train.fitting import fit
 from train.model.rules import Course, candidates
 from train.report.score import paired
@@ -120,32 +120,27 @@ def compare_stopping(
     dataset: DataSet,
     decision_points_s: Sequence[float],
     *,
-    leave_out: str = TRIAL,
     quick: bool = True,
     jobs: int = 1,
     certify: bool = False,
 ) -> dict[str, StoppingComparison]:
     """{task: early decisions compared with fixed windows}.
 
-    Each fold is held out once, and an export of the other folds decides its trials. The
-    export leaves out what the folds do: single trials, or entire groups.
+    Each fold is held out once, and an export of the other folds decides its trials.
 
     Args:
         dataset: the trials.
         decision_points_s: the windows.
-        leave_out: `trial`, or a label of which entire groups are held out. Tasks whose
-            classes have too few groups are left out then.
         quick: whether the export tries few candidates.
         jobs: processes.
         certify: export all trials too, to tell which error rates can be requested.
     """
-    tasks, folds = _folds(dataset, leave_out)
-    if not tasks:
-        return {}
+    y = {task: dataset.labels(task) for task in dataset.tasks}
+    folds = stratified_folds(y[finest(y)], FOLDS)
     options: dict[str, Any] = {
-        "leave_out": leave_out,
+        "leave_out": TRIAL,
         "decision_points_s": decision_points_s,
-        "tasks": tasks,
+        "tasks": tuple(y),
         "quick": quick,
         "jobs": 1,
     }
@@ -158,20 +153,8 @@ def compare_stopping(
         rules = model.stopping_
     return {
         task: _compared(task, held_out, decision_points_s, rules.get(task))
-        for task in tasks
+        for task in y
     }
-
-
-def _folds(dataset: DataSet, leave_out: str) -> tuple[tuple[str, ...], Integers]:
-    """The tasks that can be tested with single trials or groups left out, and each
-    trial's fold."""
-    y = {task: dataset.labels(task) for task in dataset.tasks}
-    groups = None if leave_out == TRIAL else dataset.groups(leave_out)
-    if groups is None:
-        tasks = tuple(y) if leave_out == TRIAL else ()
-        return tasks, stratified_folds(y[finest(y)], FOLDS)
-    tasks = tuple(t for t in y if t != leave_out and groupable(y[t], groups))
-    return tasks, group_folds(groups, FOLDS)
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,6 @@ from train.tradeoff.board import Board
 from train.tradeoff.choices import Points
 from train.tradeoff.commands import Commands
 from train.tradeoff.early import StoppingComparison
-from train.tradeoff.shear import Compared
 
 
 @dataclass(frozen=True)
@@ -22,8 +21,6 @@ class Measured:
         board: figures of the machine that decides.
         wire_s: from the end of the window until its last frame is read; None where the
             recordings do not tell the skin's wires.
-        breakaways: {object: seconds} until static friction breaks; empty without a
-            scene.
         points: the choice at each window.
         comparisons: {task: early decisions compared with fixed windows}.
         costs: a row for each change of the choice at the usual window
@@ -32,13 +29,11 @@ class Measured:
         notes: sentences of the choice.
         wrong, second: an owner's price of a wrong decision, and of waiting for a
             second.
-        shear: the choices with shear and without; None of recordings without it.
     """
 
     y: Labels
     board: Board
     wire_s: float | None
-    breakaways: Mapping[str, float]
     points: Points
     comparisons: Mapping[str, StoppingComparison]
     costs: Sequence[Row]
@@ -46,7 +41,6 @@ class Measured:
     notes: Sequence[str] = ()
     wrong: float = 10.0
     second: float = 1.0
-    shear: Compared | None = None
 
     @property
     def after_s(self) -> float:

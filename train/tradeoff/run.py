@@ -2,7 +2,7 @@
 board."""
 
 import json
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -12,15 +12,12 @@ from edge.errors import InputError
 from edge.recording import Recording
 from edge.writing import write_whole
 from train.data.dataset import DataSet, read
-from train.data.groups import LEAVE_OUT
 from train.report.page import write
 from train.report.section import Row, Section, counted
 from train.report.work import Workers
-from train.simulate import scene as scenes
-from train.tradeoff import answer, costs, early, shear
+from train.tradeoff import answer, costs, early
 from train.tradeoff import board as boards
-from train.tradeoff.breakaway import breakaway_times
-from train.tradeoff.choices import WINDOWS_S, Points, choices_at, prepared
+from train.tradeoff.choices import WINDOWS_S, choices_at, prepared
 from train.tradeoff.commands import Commands
 from train.tradeoff.front import ParetoFront
 from train.tradeoff.measured import Measured
@@ -57,8 +54,6 @@ class Options:
     """What a trade-off is measured with.
 
     Attributes:
-        scene: the file of the scene that the recordings were simulated from, for the
-            physical limit.
         task: of front.json; by default `category`, or else the first.
         wrong, second: an owner's price of a wrong decision, and of waiting for a
             second.
@@ -66,7 +61,6 @@ class Options:
         jobs: processes.
     """
 
-    scene: str | None = None
     task: str | None = None
     wrong: float = 10.0
     second: float = 1.0
@@ -92,7 +86,6 @@ def tradeoff(data: Sequence[str], out: Path, board_path: str, options: Options) 
     """
     workers = Workers(options.jobs)
     board = boards.read(board_path)
-    scene = None if options.scene is None else scenes.load(options.scene)
     raw = read(data, progress=True)
     boards.check(board, board_path, raw.digest)
     quick = options.quick
@@ -109,9 +102,6 @@ def tradeoff(data: Sequence[str], out: Path, board_path: str, options: Options) 
         jobs=options.jobs,
         certify=True,
     )
-    sheared = None
-    if dataset.layout.axes:
-        sheared = _sheared(dataset, points, comparisons, options)
     rows = costs.measure(raw, dataset, points, rate, workers, quick=quick)
     notes = list(ready.notes)
     if quick:
@@ -121,18 +111,15 @@ def tradeoff(data: Sequence[str], out: Path, board_path: str, options: Options) 
         y={task: dataset.labels(task) for task in order},
         board=board,
         wire_s=wire_time_s(raw.recordings, dataset.layout, rate),
-        breakaways={} if scene is None else breakaway_times(scene),
         points=points,
         comparisons=comparisons,
         costs=rows,
         wrong=options.wrong,
         second=options.second,
-        shear=sheared,
         commands=_commands(data, out, board_path, options),
         notes=notes,
     )
-    simulated = "" if scene is None else f", simulated from the scene {scene.name}"
-    report = _write(measured, out, counted(len(dataset.trials), "contact") + simulated)
+    report = _write(measured, out, counted(len(dataset.trials), "contact"))
     front = ParetoFront.of(points, main, measured.after_s, quick=quick)
     _write_front(front, out / "front.json", dataset.digest)
     return report
@@ -149,7 +136,6 @@ def _commands(data: Sequence[str], out: Path, board: str, options: Options) -> C
     return Commands(
         data=tuple(map(str, data)),
         out=out,
-        scene=options.scene,
         quick=options.quick,
         board=Path(board),
         task=options.task,
@@ -160,29 +146,6 @@ def _rate_hz(recordings: Sequence[Recording]) -> float:
     """Frames a second, as a median over the recordings whose time goes on."""
     steps_s = [np.median(np.diff(r.t)) for r in recordings if len(r.t) > 1]
     return float(np.median([1.0 / step_s for step_s in steps_s if step_s > 0.0]))
-
-
-def _sheared(
-    dataset: DataSet,
-    points: Points,
-    comparisons: Mapping[str, early.StoppingComparison],
-    options: Options,
-) -> shear.Compared:
-    """The choices with shear, measured already for known objects, beside those
-    without."""
-    quick = options.quick
-    jobs = options.jobs
-    unseen_result = early.compare_stopping(
-        dataset,
-        WINDOWS_S,
-        leave_out=LEAVE_OUT,
-        quick=quick,
-        jobs=jobs,
-        certify=True,
-    )
-    by_kind = {shear.KNOWN: comparisons, shear.UNSEEN: unseen_result}
-    sheared = shear.Answers(points, by_kind)
-    return shear.compared(dataset, sheared, Workers(jobs), quick=quick)
 
 
 def _quick_note(rows: Sequence[Row], task: str) -> str:
@@ -217,6 +180,4 @@ def _write(measured: Measured, out: Path, contacts: str) -> Path:
         f"save. It is based on {contacts}."
     ]
     sections = [make(measured) for make in SECTIONS]
-    if measured.shear is not None:
-        sections.insert(1, shear.section(measured.shear))
     return write(out, "Accuracy against time", lead, sections)

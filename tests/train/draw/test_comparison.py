@@ -79,14 +79,6 @@ def test_touches_in_other_units_do_not_share_an_axis(make_touch, tmp_path):
     assert not (tmp_path / "a.png").exists()
 
 
-@pytest.mark.parametrize(
-    "words",
-    [
-        [*TOUCHES, "--scene"],
-        [TOUCHES[0], "--scene", "--model", str(demo.MODEL)],
-        [TOUCHES[0], "--dark"],
-    ],
-)
-def test_options_that_do_not_go_together_are_one_sentence(words, capsys, tmp_path):
-    assert main(["show", *words, "--out", str(tmp_path / "a.png")]) == 2
-    assert capsys.readouterr().err.count("\n") == 1
+def test_a_dark_page_is_for_several_recordings(refusal, tmp_path):
+    message = refusal("show", TOUCHES[0], "--dark", "--out", tmp_path / "a.png")
+    assert message == "train: --dark is for several recordings"

@@ -1,4 +1,4 @@
-"""A recording as a picture, with or without a contact and the sketch of its arm."""
+"""A recording as a picture, with or without a contact."""
 
 from dataclasses import replace
 
@@ -7,7 +7,6 @@ import pytest
 from matplotlib.image import imread
 
 from edge import demo
-from edge.errors import InputError
 from edge.recording import load
 from edge.saving import save
 from train.__main__ import main
@@ -22,12 +21,6 @@ def plain(tmp_path_factory):
     out = tmp_path_factory.mktemp("picture") / "plain.png"
     assert main(["show", str(TOUCH), "--out", str(out)]) == 0
     return out
-
-
-def test_the_sketch_is_drawn_below_the_curves(plain, tmp_path):
-    sketched = tmp_path / "sketched.png"
-    assert main(["show", str(TOUCH), "--scene", "--out", str(sketched)]) == 0
-    assert sketched.stat().st_size > plain.stat().st_size
 
 
 @pytest.mark.parametrize("beside", [[], [str(TOUCH)]])
@@ -49,12 +42,7 @@ def test_shear_adds_arrows(plain, tmp_path):
     assert white > 100
 
 
-def test_without_contact_it_is_drawn_and_without_an_arm_it_is_not_sketched(
-    make_touch, tmp_path
-):
+def test_a_recording_without_contact_is_drawn(make_touch, tmp_path):
     save(tmp_path / "quiet.npz", make_touch(seconds=0.0, arm=False))
     assert main(["show", str(tmp_path / "quiet.npz")]) == 0
     assert (tmp_path / "quiet.png").read_bytes().startswith(b"\x89PNG")
-    with pytest.raises(InputError, match="there is no arm to sketch"):
-        draw(load(tmp_path / "quiet.npz"), tmp_path / "no.png", scene=True)
-    assert not (tmp_path / "no.png").exists()

@@ -12,6 +12,8 @@ from train.tradeoff.commands import Commands
 from train.tradeoff.early import Certified
 from train.tradeoff.measured import Measured
 
+BUILD = Path("build/tradeoff")
+
 
 def chosen(right, unseen=None, of=100):
     """A choice that answers so many trials rightly, and so many of unseen objects
@@ -44,8 +46,7 @@ def measured(points, certified, **changes):
         },
         "costs": [],
         "board": SimpleNamespace(arithmetic_s=0.0, name="a board"),
-        "commands": Commands(("mine",), Path("build/tradeoff")),
+        "commands": Commands(("mine",), BUILD, BUILD / "board.json"),
         "wire_s": 0.0,
-        "breakaways": {},
     }
     return Measured(**{**facts, **changes})

@@ -16,7 +16,8 @@ from edge.model.model import Model
 from edge.recording import load
 from edge.tools.replay import decide
 from export.__main__ import main
-from tests.train.tradeoff.test_tradeoff import SCENE, board_file
+from tests.conftest import ROOT
+from tests.train.tradeoff.test_tradeoff import board_file
 from train.data.dataset import read
 from train.simulate import scene as scenes
 from train.simulate.run import write
@@ -25,6 +26,7 @@ from train.tradeoff import run as running
 from train.tradeoff.front import NAMES
 from train.tradeoff.run import Options
 
+SCENE = ROOT / "train" / "scenes" / "cody18.toml"
 SEED = 4711
 FRESH_SEED = 4712
 FRESH = 6

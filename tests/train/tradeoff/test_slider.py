@@ -21,7 +21,8 @@ MEASURED = measured(
     ANSWERS,
     {"mobility": [rule()], "<b>": []},
 )
-EARLY = "make export DATA=mine EXPORT='--leave-out trial --decision-points"
+EXPORT = "python -m export --data mine --out build"
+EARLY = f"{EXPORT} --leave-out trial --decision-points"
 
 
 def page():
@@ -38,12 +39,12 @@ def test_the_time_of_an_accuracy_is_told_early_and_fixed_with_its_commands():
     is 1.96 times 0.1 s, over 10, times the root of 2.5."""
     early, fixed, other, _ = html.unescape(reached(MEASURED, 0.9)).split("</tr>")
     assert "after 0.50 s on average (at most 0.53), early: 95 % (83 to 99)" in early
-    assert f"<code>{EARLY} 0.2:1.2:0.1'</code>, then " in early
+    assert f"<code>{EARLY} 0.2:1.2:0.1</code>, then " in early
     assert (
         "<code>edge-classify run --model build/model.onnx --error 0.1</code>" in early
     )
     assert "<td>mobility</td><td>after 1 s, fixed: 97 % (86 to 99)</td>" in fixed
-    assert "<code>make export DATA=mine EXPORT='--window 1'</code>" in fixed
+    assert f"<code>{EXPORT} --window 1</code>" in fixed
     assert "<td><b></td><td>after 1.2 s, fixed: 91 % (78 to 97)</td>" in other
 
 
@@ -58,21 +59,21 @@ def test_the_names_of_the_front_have_their_task_and_interval():
     text = page()
     for name, share in (("fast", "60 %"), ("balanced", "60 %"), ("accurate", "99 %")):
         assert f"<td>{name}</td><td>mobility: {share} (" in text
-        assert f"make export DATA=mine FRONT={name}" in text
+        assert f"{EXPORT} --front {name} --fronts build/tradeoff/front.json" in text
 
 
 def test_the_cheapest_use_has_its_accuracy_prices_and_commands():
     *_, row = html.unescape(fronts(MEASURED)).split("<tr>")
     words = "95 % (83 to 99) after 0.50 s, where a wrong decision costs 10 and a second"
     assert row.startswith(f"<td>cheapest</td><td>mobility: {words} of waiting 1</td>")
-    assert f"<code>{EARLY} 0.2:1.2:0.1'</code>, then <code>edge-classify run" in row
+    assert f"<code>{EARLY} 0.2:1.2:0.1</code>, then <code>edge-classify run" in row
 
 
 def test_without_a_script_the_lines_show_the_accuracy_after_a_second():
     text = page()
     assert '<td class="share">97 %</td><td class="interval">(86 to 99)</td>' in text
     assert text.count('<td class="unseen">73 %</td>') == 1
-    assert "make export DATA=mine EXPORT=&#x27;--window 1&#x27;" in text
+    assert f"{EXPORT} --window 1" in text
     assert text.index("<label hidden>") < text.index("<script>")
     assert "<td>&lt;b&gt;</td>" in text
 
@@ -98,7 +99,7 @@ def test_in_a_browser_the_slider_moves_the_time(tmp_path, width):
     assert "After waiting 0.4 s" in text
     assert "60 %" in text
     assert "--window 0.4" in text
-    assert copied == "make export DATA=mine EXPORT='--window 0.4'"
+    assert copied == f"{EXPORT} --window 0.4"
 
 
 def test_in_a_browser_the_other_slider_moves_the_accuracy(tmp_path):

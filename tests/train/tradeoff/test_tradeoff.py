@@ -29,14 +29,11 @@ from train.model.rules import NEVER, Course
 from train.report.work import Workers
 from train.tradeoff import answer, board, choices, costs, early
 from train.tradeoff import run as running
-from train.tradeoff.breakaway import breakaway_times
 from train.tradeoff.choices import chosen as make_choice
 from train.tradeoff.choices import followed, unseen
 from train.tradeoff.front import ParetoFront
 from train.tradeoff.run import Options
 from train.tradeoff.wires import spread, wire, wire_time_s, wires
-
-SCENE = Path(__file__).parents[3] / "train" / "scenes" / "cody18.toml"
 
 
 class TestWires:
@@ -312,34 +309,6 @@ class TestEarly:
         assert decisions.wrong == 0.0
         assert decisions.mean_s == pytest.approx(0.6)
 
-    def test_unseen_objects_are_decided_by_models_that_never_met_them(
-        self,
-        tmp_path,
-        make_touch,
-        monkeypatch,
-    ):
-        for kind in ("hard", "soft"):
-            for number in range(16):
-                labels = {"softness": kind, "object": f"{kind} {number % 4}"}
-                touch = make_touch(kind=kind, seed=number, labels=labels)
-                save(tmp_path / f"{kind}-{number}.npz", touch)
-        dataset = followed(read([str(tmp_path)]))
-        met = []
-        fixed = {"features": ("paper",), "projection": "pca", "scaling": "IV", "k": 1}
-        fit = partial(early.fit, **fixed)
-
-        def spy(trials, **options):
-            met.append(set(trials.labels("object")))
-            return fit(trials, **options)
-
-        monkeypatch.setattr(early, "fit", spy)
-        compared = early.compare_stopping(dataset, (0.6, 1.2), leave_out="object")
-        objects = set(dataset.labels("object"))
-        assert list(compared) == ["softness"]
-        assert sorted(name for names in met for name in objects - names) == sorted(
-            objects
-        )
-
     @pytest.mark.slow
     def test_features_of_kernels_have_the_tables_of_the_other_folds(
         self,
@@ -350,17 +319,6 @@ class TestEarly:
         monkeypatch.setattr(early, "fit", partial(early.fit, **fixed))
         dataset = followed(read([save_touches(tmp_path, 20)]), ("zone_kernels",))
         assert early.compare_stopping(dataset, (0.6, 1.2))["category"].right.all()
-
-    def test_an_object_moves_when_the_arm_s_spring_breaks_friction(self):
-        from train.simulate.scene import load
-
-        floors = breakaway_times(load(SCENE))
-        box = floors["cardboard box"]
-        # mu_s m g / (k v): equal arms, so the ratio of two objects is that of mu_s m.
-        assert floors["plastic bin"] / box == pytest.approx(0.28 / 0.6)
-        # The chair tips: 0.4 / (2 * 0.7) instead of 0.6.
-        assert floors["chair"] / box == pytest.approx((4 * 0.4 / 1.4) / 0.6)
-        assert 0.3 < box < 0.5
 
 
 class TestBoard:
@@ -429,7 +387,7 @@ def written(tmp_path_factory):
     save(folder / "data" / "single_frame.npz", single)
     digest = read([data]).digest
     path = board_file(folder / "board.json", digest)
-    options = Options(scene=str(SCENE), quick=True)
+    options = Options(quick=True)
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(running, "FEWEST", 28)
         patch.setattr(early, "FOLDS", 4)
