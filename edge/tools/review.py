@@ -17,7 +17,6 @@ UNSURE = 0.8
 KINDS = ("unsure", "wrong", "unlabelled")
 CURVE = 32
 """Points of a small curve."""
-BLOCKS = "▁▂▃▄▅▆▇█"
 
 
 def curve(recording: Recording, points: int = CURVE) -> list[int]:
@@ -27,15 +26,6 @@ def curve(recording: Recording, points: int = CURVE) -> list[int]:
     spans = np.array_split(peaks, min(points, len(peaks)))
     highest = max(int(peaks.max()), 1)
     return [int(span.max()) * 100 // highest for span in spans]
-
-
-def sparkline(percent: Sequence[int]) -> str:
-    """A curve as one line of blocks.
-
-    >>> sparkline([0, 50, 100])
-    '▁▄█'
-    """
-    return "".join(BLOCKS[value * (len(BLOCKS) - 1) // 100] for value in percent)
 
 
 def decisions_of(decided: Sequence[Decided]) -> dict[str, Any]:
