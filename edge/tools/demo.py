@@ -10,7 +10,7 @@ import argparse
 
 from edge import demo
 from edge.classifier import Classifier
-from edge.commands.output import LOG, Output
+from edge.commands.output import Output
 from edge.events import Decided
 from edge.fake.player import play, skin_file
 from edge.model.model import Model
@@ -42,10 +42,7 @@ def run(arguments: argparse.Namespace) -> int:
                 right.append(line["expected"] == event.label)
             output.event(line)
     score = f"{sum(right)} of {len(right)} decisions are right"
-    if output.as_json:
-        LOG.info(score)
-    else:
-        output.text(
-            f"{score}; `edge-classify view --fake REC.npz` shows a touch as it happens."
-        )
+    output.text(
+        f"{score}; `edge-classify view --fake REC.npz` shows a touch as it happens."
+    )
     return 0 if right and all(right) else 1

@@ -46,7 +46,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         (
             "--only",
             "WHICH",
-            review.kind_or_task,
+            str,
             "only recordings that are unsure, wrong or unlabelled, or that have a "
             "task; repeat it for recordings that are all of these",
         ),

@@ -1,7 +1,6 @@
 """What a person sees of a recorded touch: its curve, its decisions, and which touches
 ask for a look."""
 
-import argparse
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -97,17 +96,6 @@ def accepted(meta: Mapping[str, Any]) -> dict[str, str]:
         and isinstance(answer["label"], str)
         and answer["label"] != UNKNOWN
     }
-
-
-def kind_or_task(text: str) -> str:
-    """A word that selects touches: one of `KINDS`, or the name of a task.
-
-    Raises:
-        ArgumentTypeError: the word is empty.
-    """
-    if not text.strip():
-        raise argparse.ArgumentTypeError(f"must be {', '.join(KINDS)} or a task")
-    return text
 
 
 def selected(meta: Mapping[str, Any], words: Sequence[str]) -> bool:
