@@ -3,15 +3,13 @@
 import grp
 import os
 import platform
-import pwd
 import shutil
 import sys
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
-from typing import Any
 
 from edge import __version__
 from edge.model.info import FORMAT
@@ -50,9 +48,6 @@ def look(root: Path = Path("/")) -> Iterator[Row]:
         except PackageNotFoundError:
             yield _missing(package)
     yield from _devices(root)
-    groups = sorted(map(_group, {os.getegid(), *os.getgroups()}))
-    user = _name(pwd.getpwuid, os.geteuid())
-    yield Row("user", f"{user}; groups {', '.join(groups)}")
     yield from _state()
 
 
@@ -107,13 +102,8 @@ def _device(root: Path, device: Path, group: str) -> Row:
 
 
 def _group(number: int) -> str:
-    return _name(grp.getgrgid, number)
-
-
-def _name(entry: Callable[[int], Any], number: int) -> str:
-    """A name from a database of users or groups; the number where it has none, as in
-    many containers."""
+    """The name of a group; its number where it has none, as in many containers."""
     try:
-        return str(entry(number)[0])
+        return grp.getgrgid(number)[0]
     except KeyError:
         return str(number)

@@ -14,14 +14,9 @@ from importlib.util import find_spec
 
 from edge.commands.options import within
 from edge.commands.output import Output, counted
-from edge.model.model import Model
 from edge.skin.calibration import deaf_taxels
 from edge.skin.decoder import NEVER_STUCK, stuck_limits
 from edge.skin.file import SkinFile, load
-from edge.touch.differences import differences
-
-FRAMES = 100
-"""Counted together, since some transactions are not needed in every frame."""
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
@@ -32,7 +27,6 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         metavar="skin.toml",
         help="the file that describes the skin; without it, look at this machine",
     )
-    parser.add_argument("--model", help="model.onnx, whose skin is compared with it")
     parser.add_argument(
         "--overhead",
         type=within(float, 0.0, 10_000.0),
@@ -140,9 +134,6 @@ def run(arguments: argparse.Namespace) -> int:
     frame_bits, rate_hz = wires(file, arguments.overhead)
     wrong = list(faults(file))
     remarked = list(remarks(file))
-    if arguments.model is not None:
-        model = Model(arguments.model)
-        remarked += differences(model.info.layout, file.layout)
     target_hz = file.reading.rate_hz
     if rate_hz < target_hz:
         wrong.append(
@@ -195,11 +186,6 @@ def wires(file: SkinFile, overhead_us: float) -> tuple[list[float], float]:
         The bits, and the frames a second that the wires carry with the software's time
         for each transaction.
     """
-    from edge.fake.player import (  # a check of the board needs no chips
-        frame_bits,
-        frame_rate,
-    )
+    from edge.fake import player  # a check of the board needs no chips
 
-    spent = frame_bits(file, FRAMES, overhead_us * 1e-6)
-    clocks = [bus.clock_hz for bus in file.buses]
-    return frame_bits(file, FRAMES), frame_rate(spent, clocks)
+    return player.frame_bits(file), player.frame_rate(file, overhead_us * 1e-6)

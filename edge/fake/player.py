@@ -28,7 +28,7 @@ from edge.skin.wiring import BusSpec
 from edge.touch.frame import Frame
 from edge.touch.layout import SkinLayout
 
-WIRE_FRAMES = 20
+FRAMES = 100
 """Frames whose bits are counted together, as some transactions are rare."""
 NOISE_FRAMES = 97
 NOISE_STEP_S = 0.001
@@ -306,7 +306,9 @@ def play_file(
     return play(file, recording, loop=loop, clock=clock, noise_counts=noise_counts)
 
 
-def frame_bits(file: SkinFile, frames: int = 1, overhead_s: float = 0.0) -> list[float]:
+def frame_bits(
+    file: SkinFile, frames: int = FRAMES, overhead_s: float = 0.0
+) -> list[float]:
     """Bits on the wire of each bus for a frame, as a mean over some, counted while the
     drivers send them.
 
@@ -328,21 +330,12 @@ def frame_bits(file: SkinFile, frames: int = 1, overhead_s: float = 0.0) -> list
         ]
 
 
-def frame_rate(bits: Sequence[float], clocks: Sequence[int]) -> float:
-    """Frames a second that buses carry side by side.
-
-    Args:
-        bits: of a frame on each bus.
-        clocks: of each bus, in Hz.
-    """
-    slowest_s = max(count / hz for count, hz in zip(bits, clocks, strict=True))
-    return 1.0 / slowest_s
-
-
-def carried_hz(file: SkinFile) -> float:
-    """Frames a second that a skin's wires carry, from the drivers' own transactions."""
+def frame_rate(file: SkinFile, overhead_s: float = 0.0) -> float:
+    """Frames a second that the skin's buses carry side by side, with the software's time
+    of each transaction."""
+    bits = frame_bits(file, overhead_s=overhead_s)
     clocks = [bus.clock_hz for bus in file.buses]
-    return frame_rate(frame_bits(file, WIRE_FRAMES), clocks)
+    return 1.0 / max(count / hz for count, hz in zip(bits, clocks, strict=True))
 
 
 def skin_file(layout: SkinLayout) -> SkinFile:

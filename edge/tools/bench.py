@@ -203,12 +203,8 @@ def cold_start_ms(path: str) -> float:
 
 
 def kind() -> str:
-    """The name of the board, or else of the processor."""
+    """The name of the board, or else of the processor's kind."""
     with suppress(OSError):
         board = Path("/proc/device-tree/model").read_text(errors="replace")
         return board.strip("\x00 \n")
-    with suppress(OSError):
-        processor = Path("/proc/cpuinfo").read_text().partition("model name")[2]
-        if processor:
-            return processor.splitlines()[0].strip("\t: ")
-    return platform.processor() or "unknown"
+    return platform.machine()

@@ -8,16 +8,13 @@ wrong.
 
 import argparse
 
-import numpy as np
-
 from edge import demo
 from edge.classifier import Classifier
-from edge.commands.output import LOG, Output
+from edge.commands.output import Output
 from edge.events import Decided
 from edge.fake.player import play, skin_file
 from edge.model.model import Model
-from edge.recording import Recording, load
-from edge.tools import terminal
+from edge.recording import load
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
@@ -44,23 +41,8 @@ def run(arguments: argparse.Namespace) -> int:
                 line["expected"] = recording.labels[event.task]
                 right.append(line["expected"] == event.label)
             output.event(line)
-        if not output.as_json:
-            print(picture(recording) + "\n", flush=True)
     score = f"{sum(right)} of {len(right)} decisions are right"
-    if output.as_json:
-        LOG.info(score)
-    else:
-        output.text(
-            f"{score}; `edge-classify view --fake REC.npz` shows a touch as it happens."
-        )
+    output.text(
+        f"{score}; `edge-classify view --fake REC.npz` shows a touch as it happens."
+    )
     return 0 if right and all(right) else 1
-
-
-def picture(recording: Recording) -> str:
-    """The frame of a recording with the largest sum of counts, as lines for a
-    terminal."""
-    layout = recording.layout
-    strongest = int(recording.frames.sum(axis=(1, 2), dtype=np.int64).argmax())
-    full = int(recording.frames.max())
-    colour, _ = terminal.skin_colours(list(recording)[strongest], layout, full)
-    return terminal.picture(colour)

@@ -1,14 +1,13 @@
 """List the labels of recordings, or change them.
 
-Without --set, --unset, --accept and --delete, prints each recording's course
-of force, labels and decisions, how many recordings have each label, and which are
-probably slips. With them, shows what would change, and with --yes writes the changed
-recordings anew, each whole or not at all, if all of them can be read. --undo takes the
-last change back. The next `make export` trains on the new labels.
+Without --set, --unset, --accept and --delete, prints each recording's labels and
+decisions, how many recordings have each label, and which are probably slips. With
+them, shows what would change, and with --yes writes the changed recordings anew, each
+whole or not at all, if all of them can be read. --undo takes the last change back. The next
+`make export` trains on the new labels.
 """
 
 import argparse
-import sys
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -21,9 +20,6 @@ from edge.saving import alone, change_all, find, take_back
 from edge.tools import review
 from edge.tools.slips import counts_text, slips
 from edge.tools.trial_options import task_label
-
-LINE = 16
-"""Characters of a recording's course."""
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
@@ -50,7 +46,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         (
             "--only",
             "WHICH",
-            review.kind_or_task,
+            str,
             "only recordings that are unsure, wrong or unlabelled, or that have a "
             "task; repeat it for recordings that are all of these",
         ),
@@ -67,7 +63,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         "--accept": "label kept touches as they were decided, in tasks without a label",
         "--delete": "delete the recordings",
         "--undo": "take the last change in a folder back",
-        "--yes": "change the recordings without a question",
+        "--yes": "change the recordings, which else are only shown",
     }.items():
         parser.add_argument(option, action="store_true", help=text)
 
@@ -79,15 +75,16 @@ def run(arguments: argparse.Namespace) -> int:
         return undo(arguments.data, output)
     every = find(arguments.data)
     words = arguments
-    if not (words.accept or words.set or words.unset or words.delete):
-        recordings = _chosen(output, every, words.only)
-        if recordings:
-            _print(output, recordings)
-        return int(not recordings)
+    changes = words.accept or words.set or words.unset or words.delete
     # Nobody else changes what is changed here, from its reading on.
-    with alone(path.parent for path in every):
-        recordings = _chosen(output, every, arguments.only)
-        return _change(arguments, output, recordings) if recordings else 1
+    with alone({path.parent for path in every} if changes else ()):
+        recordings = _chosen(output, every, words.only)
+        if not recordings:
+            return 1
+        if changes:
+            return _change(arguments, output, recordings)
+        _print(output, recordings)
+        return 0
 
 
 def _chosen(
@@ -109,7 +106,11 @@ def _change(
     output: Output,
     recordings: Sequence[tuple[Path, Recording]],
 ) -> int:
-    """Show what becomes of recordings, ask, and change them."""
+    """Show what becomes of recordings, and change them.
+
+    Raises:
+        InputError: --yes is missing.
+    """
     changes: dict[Path, dict[str, str] | None] = {}
     for path, recording in recordings:
         after = _after(arguments, path, recording)
@@ -120,8 +121,11 @@ def _change(
     if not changes:
         output.text(f"none of {counted(len(recordings), 'recording')} would change")
         return 0
-    if not _agreed(arguments, output, len(changes)):
-        return 1
+    if not arguments.yes:
+        recordings_text = counted(len(changes), "recording")
+        raise InputError(
+            f"{recordings_text} would change, as shown; add --yes to do it"
+        )
     change_all(changes)
     if arguments.delete:
         deleted = counted(len(changes), "recording")
@@ -162,23 +166,6 @@ def undo(data: Sequence[str], output: Output) -> int:
     return 0
 
 
-def _agreed(arguments: argparse.Namespace, output: Output, count: int) -> bool:
-    """Whether a person at the terminal agrees; a program has to say --yes.
-
-    Raises:
-        InputError: nobody can be asked.
-    """
-    recordings = counted(count, "recording")
-    if arguments.yes:
-        return True
-    if output.as_json or not sys.stdin.isatty():
-        raise InputError(f"{recordings} would change, as shown; add --yes to do it")
-    if input(f"Change {recordings}? [y/N] ").lower() == "y":
-        return True
-    output.text("nothing is changed")
-    return False
-
-
 def _text(labels: Mapping[str, str]) -> str:
     return labels_text(labels, " ") or "no label"
 
@@ -195,8 +182,7 @@ def _decided_text(decided: Mapping[str, Mapping[str, Any]]) -> str:
 
 
 def _print(output: Output, recordings: Sequence[tuple[Path, Recording]]) -> None:
-    """Print each recording's course and labels, how many have each label, and probable
-    slips."""
+    """Print each recording's labels, how many have each label, and probable slips."""
     width = max(len(str(path)) for path, _ in recordings)
     labels = [recording.labels for _, recording in recordings]
     for path, recording in recordings:
@@ -207,8 +193,7 @@ def _print(output: Output, recordings: Sequence[tuple[Path, Recording]]) -> None
             "labels": recording.labels,
             "kinds": review.kinds(recording.meta),
         }
-        line = review.sparkline(review.curve(recording, LINE))
-        text = f"{path!s:<{width}}  {line}  {_text(recording.labels)}"
+        text = f"{path!s:<{width}}  {_text(recording.labels)}"
         if decided:
             event["decided"] = decided
             text += f" (decided: {_decided_text(decided)})"

@@ -336,9 +336,9 @@ def _joint_names(
 
 def wire_s(file: SkinFile) -> float:
     """Seconds that a frame takes on the skin's wires."""
-    from edge.fake.player import carried_hz  # counts the bits on a fake bus
+    from edge.fake.player import frame_rate  # counts the bits on a fake bus
 
-    return round(1.0 / carried_hz(file), 6)
+    return round(1.0 / frame_rate(file), 6)
 
 
 def _status(arguments: argparse.Namespace, recorder: Recorder, skin: Skin) -> int:

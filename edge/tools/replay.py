@@ -26,8 +26,6 @@ from edge.touch.contact import FeatureSeries
 
 UNDECIDED = "(none)"
 """The column of trials without a decision."""
-WIDEST = 100
-"""Characters of a matrix whose columns carry their labels."""
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
@@ -239,18 +237,12 @@ class Summary:
 def _matrix(pairs: Counter[tuple[str, str]]) -> str:
     truths = sorted({truth for truth, _ in pairs})
     decided = sorted({*truths, *(label for _, label in pairs)})
-    heads = decided
-    names = truths
-    # The columns of a wide matrix are numbered, so that 36 objects fit on a screen.
-    if sum(len(label) + 2 for label in decided) > WIDEST:
-        heads = [str(i + 1) for i in range(len(decided))]
-        names = [f"{decided.index(truth) + 1:>3}  {truth}" for truth in truths]
-    width = max(map(len, names))
-    widths = [max(len(head), 3) for head in heads]
-    lines = [" " * width + _cells(heads, widths)]
-    for name, truth in zip(names, truths, strict=True):
+    width = max(map(len, truths))
+    widths = [max(len(label), 3) for label in decided]
+    lines = [" " * width + _cells(decided, widths)]
+    for truth in truths:
         counts = [pairs[truth, label] for label in decided]
-        lines.append(f"{name:<{width}}{_cells(counts, widths)}")
+        lines.append(f"{truth:<{width}}{_cells(counts, widths)}")
     return "\n".join(lines)
 
 

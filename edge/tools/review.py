@@ -1,7 +1,6 @@
 """What a person sees of a recorded touch: its curve, its decisions, and which touches
 ask for a look."""
 
-import argparse
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -17,7 +16,6 @@ UNSURE = 0.8
 KINDS = ("unsure", "wrong", "unlabelled")
 CURVE = 32
 """Points of a small curve."""
-BLOCKS = "▁▂▃▄▅▆▇█"
 
 
 def curve(recording: Recording, points: int = CURVE) -> list[int]:
@@ -27,15 +25,6 @@ def curve(recording: Recording, points: int = CURVE) -> list[int]:
     spans = np.array_split(peaks, min(points, len(peaks)))
     highest = max(int(peaks.max()), 1)
     return [int(span.max()) * 100 // highest for span in spans]
-
-
-def sparkline(percent: Sequence[int]) -> str:
-    """A curve as one line of blocks.
-
-    >>> sparkline([0, 50, 100])
-    '▁▄█'
-    """
-    return "".join(BLOCKS[value * (len(BLOCKS) - 1) // 100] for value in percent)
 
 
 def decisions_of(decided: Sequence[Decided]) -> dict[str, Any]:
@@ -107,17 +96,6 @@ def accepted(meta: Mapping[str, Any]) -> dict[str, str]:
         and isinstance(answer["label"], str)
         and answer["label"] != UNKNOWN
     }
-
-
-def kind_or_task(text: str) -> str:
-    """A word that selects touches: one of `KINDS`, or the name of a task.
-
-    Raises:
-        ArgumentTypeError: the word is empty.
-    """
-    if not text.strip():
-        raise argparse.ArgumentTypeError(f"must be {', '.join(KINDS)} or a task")
-    return text
 
 
 def selected(meta: Mapping[str, Any], words: Sequence[str]) -> bool:

@@ -7,13 +7,12 @@ from difflib import SequenceMatcher
 
 from edge.labels import CATEGORY
 
-RARE_SHARE = 0.1
-"""A task that fewer of the recordings have is named."""
 FEW_SHARE = 0.25
-"""A label is a slip of another one if it is at most so frequent in comparison."""
+"""A name is a slip of another one if it is at most so frequent in comparison."""
 SHORT = 3
-"""Letters of a name that others resemble by chance, so that only a rare one is a
-slip."""
+RARE_SHARE = 0.1
+"""Letters of a name that others resemble by chance, so that only one that is at most so
+frequent is a slip."""
 LETTERS_PER_SLIP = 7
 """Letters of a name for each wrong one, of which one is always allowed."""
 SPACES = re.compile(r"[\s_-]+")
@@ -31,9 +30,11 @@ def slips(labels: Labels) -> list[str]:
     >>> slips([{"object": "box"}] * 8 + [{"object": "Box"}])
     ["object='Box' on 1 of 9 recordings; is it 'box'?"]
     """
-    sentences = [*_rare_tasks(labels), *_contradictions(labels)]
-    for task in sorted(set().union(*labels)):
-        sentences += _rare_labels(task, labels)
+    tasks = Counter(task for trial in labels for task in trial)
+    sentences = _rare("task ", tasks, len(labels)) + _contradictions(labels)
+    for task in sorted(tasks):
+        counts = _label_counts(task, labels)
+        sentences += _rare(f"{task}=", counts, counts.total())
     return sentences
 
 
@@ -54,31 +55,23 @@ def _label_counts(task: str, labels: Labels) -> Counter[str]:
     return Counter(trial[task] for trial in labels if task in trial)
 
 
-def _rare_tasks(labels: Labels) -> list[str]:
-    counts = Counter(task for trial in labels for task in trial)
-    sentences = []
-    for task, count in sorted(counts.items()):
-        meant = _meant(task, count, counts)
-        if meant is not None or count <= RARE_SHARE * len(labels):
-            question = "" if meant is None else f"; is it {meant!r}?"
-            sentences.append(
-                f"task {task!r} on {count} of {len(labels)} recordings{question}"
-            )
-    return sentences[:MOST]
+def _rare(thing: str, counts: Mapping[str, int], total: int) -> list[str]:
+    """Sentences on the names that are probably slips.
 
-
-def _rare_labels(task: str, labels: Labels) -> list[str]:
-    counts = _label_counts(task, labels)
-    total = counts.total()
+    Args:
+        thing: stands before each name.
+        counts: of the recordings with each name.
+        total: recordings that could have one.
+    """
     sentences = []
-    for label, count in sorted(counts.items()):
-        meant = _meant(label, count, counts)
+    for name, count in sorted(counts.items()):
+        meant = _meant(name, count, counts)
         if meant is not None:
             sentences.append(
-                f"{task}={label!r} on {count} of {total} recordings; is it {meant!r}?"
+                f"{thing}{name!r} on {count} of {total} recordings; is it {meant!r}?"
             )
         elif count == 1 and len(counts) < total:
-            sentences.append(f"{task}={label!r} on a single recording")
+            sentences.append(f"{thing}{name!r} on a single recording")
     return sentences[:MOST]
 
 

@@ -1,8 +1,6 @@
 """The skin on a terminal in ANSI half-blocks, two rows of taxels in each line."""
 
 import math
-import re
-import textwrap
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from itertools import groupby
@@ -30,7 +28,8 @@ TOUCH = (88, 124, 160, 196, 202, 208, 214, 220, 226, 228, 231)
 LOST = 18
 """Dark blue, for a taxel that cannot be read."""
 LEGEND = (
-    "■■■ touched, by force   ■ below the threshold   ■ cannot be read   Ctrl-C quits"
+    "red to white: in contact, by force; grey: below the threshold; blue: cannot be "
+    "read; Ctrl-C quits"
 )
 
 
@@ -107,15 +106,6 @@ def caption(frame: Frame, regions: Sequence[Region], layout: SkinLayout) -> str:
             f"{int((~frame.valid).sum())} of {frame.valid.size} taxels cannot be read"
         )
     return "  |  ".join(items)
-
-
-def legend(columns: int) -> list[str]:
-    """The meaning of the colours, in lines no longer than `columns`."""
-    marks = iter((*TOUCH[2::3], REST[-1], LOST))
-    return [
-        re.sub("■", lambda _: f"\x1b[38;5;{next(marks)}m■{PLAIN}", line)
-        for line in textwrap.wrap(LEGEND, columns)
-    ]
 
 
 def screen(text: str) -> str:

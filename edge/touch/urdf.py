@@ -49,12 +49,6 @@ def _root(path: str | os.PathLike[str]) -> ElementTree.Element:
     """The element `robot` of a URDF file."""
     with parsing(os.fspath(path), "a URDF file"):
         root = ElementTree.fromstring(read_bytes(path))
-    name = os.path.basename(path)
-    if str(name).lower().endswith(".xacro"):
-        raise InputError(
-            f"{path}: is a xacro macro, not a URDF file; expand it by "
-            f"`xacro {name} > expanded.urdf`"
-        )
     if root.tag != "robot":
         raise InputError(
             f"{path}: not a URDF file: its root is <{root.tag}> instead of <robot>"

@@ -9,15 +9,13 @@ from edge.chips.ad7147 import AD7147
 from edge.chips.block import Block
 from edge.chips.chip import UNUSED, ChipSpec
 from edge.chips.three_axes import ThreeAxisBlock
-from edge.fake.player import frame_bits, frame_rate
+from edge.fake.player import frame_rate
 from edge.recording import Recording
 from edge.skin import file as skinfile
 from edge.skin.file import SkinFile
 from edge.skin.wiring import BusSpec
 from edge.touch.layout import SkinLayout
 
-FRAMES = 100
-"""Frames counted together, so that rare transactions have their share."""
 STAGES = 12
 """Taxels of an AD7147."""
 CHANNELS = 8
@@ -46,12 +44,10 @@ class Wire:
 
 def wire(chips: str, file: SkinFile) -> Wire:
     """The wiring of a skin file, with the name of its chips."""
-    bits = frame_bits(file, FRAMES)
     clocks = [bus.clock_hz for bus in file.buses]
     buses = "1 bus" if len(clocks) == 1 else f"{len(clocks)} buses"
-    return Wire(
-        f"{chips}, {buses} at {clocks[0] // 1000} kHz", 1.0 / frame_rate(bits, clocks)
-    )
+    name = f"{chips}, {buses} at {clocks[0] // 1000} kHz"
+    return Wire(name, 1.0 / frame_rate(file))
 
 
 def spread(layout: SkinLayout, buses: int) -> SkinFile:

@@ -166,9 +166,9 @@ def test_a_board_is_told_what_it_has(board):
     assert not any(row.remedy for row in rows.values())
 
 
-def test_a_user_without_a_name_is_a_number(board, monkeypatch):
-    monkeypatch.setattr(board_module.os, "geteuid", lambda: 54321)
-    assert board()["user"].value.startswith("54321; groups ")
+def test_a_group_without_a_name_is_a_number(board, monkeypatch):
+    monkeypatch.setattr(board_module.grp, "getgrgid", {}.__getitem__)
+    assert board(i2c_1="bcm2835")["/dev/i2c-1"].value[-1].isdecimal()
 
 
 def test_what_a_board_lacks_comes_with_its_remedy(board, monkeypatch):

@@ -43,8 +43,7 @@ def on_buses(n, *, kind=ad7147.AD7147):
 def test_the_wires_carry_these_frame_rates_at_400_khz(kind, buses, hz):
     """From the bytes of the data sheets: 8320 bits for 32 AD7147, 8032 for 32
     MPR121."""
-    bits = frame_bits(on_buses(buses, kind=kind))
-    assert abs(frame_rate(bits, [400_000] * buses) - hz) <= 0.0501
+    assert abs(frame_rate(on_buses(buses, kind=kind)) - hz) <= 0.0501
 
 
 def test_all_checks_together_cost_at_most_3_percent_of_the_wire():

@@ -1,6 +1,5 @@
 """What asks for a look at a touch, and its course in a few numbers."""
 
-import argparse
 from dataclasses import replace
 
 import numpy as np
@@ -43,12 +42,6 @@ def test_a_recording_is_selected_by_all_words():
     assert review.selected(meta, [])
     assert review.selected(meta, ["unsure", "a", "b"])
     assert not review.selected(meta, ["unsure", "c"])
-
-
-def test_a_word_that_selects_is_not_empty():
-    assert review.kind_or_task("softness") == "softness"
-    with pytest.raises(argparse.ArgumentTypeError, match="unsure, wrong, unlabelled"):
-        review.kind_or_task(" ")
 
 
 def test_a_course_is_in_percent_of_its_highest_and_misses_no_peak(make_touch):

@@ -1,7 +1,5 @@
 """The skin as half-blocks."""
 
-import re
-
 import numpy as np
 
 from edge.tools import terminal
@@ -72,10 +70,3 @@ def test_a_skin_that_feels_everything_or_nothing_is_drawn():
         f = Frame(t=0.0, counts=np.full((3, 5), counts, dtype=np.uint16))
         colour, _ = terminal.skin_colours(f, SkinLayout(rows=3, cols=5), 1)
         assert terminal.picture(colour).count("▀") == 2 * 5 * 2
-
-
-def test_the_legend_is_one_line_where_it_fits_to_the_column():
-    (whole,) = terminal.legend(1000)
-    columns = len(re.sub(r"\x1b\[[^m]*m", "", whole))
-    assert terminal.legend(columns) == [whole]
-    assert len(terminal.legend(columns - 1)) == 2

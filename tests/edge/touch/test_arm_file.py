@@ -18,9 +18,3 @@ def test_a_urdf_without_its_links_is_refused(urdf):
 def test_links_are_for_a_urdf_alone():
     with pytest.raises(InputError, match="--base and --tip are for a .urdf file"):
         read_arm("arm.toml", "base", "tool")
-
-
-def test_a_xacro_file_is_called_one_although_links_are_named(urdf):
-    path = urdf.rename(urdf.with_suffix(".urdf.xacro"))
-    with pytest.raises(InputError, match="is a xacro macro, not a URDF file"):
-        read_arm(path, "base", "tool")
