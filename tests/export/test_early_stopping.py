@@ -60,11 +60,6 @@ def decided(model, recording, error):
     return {event.task: event for event in events if isinstance(event, Decided)}
 
 
-def test_numpy_gives_the_same_bits_at_every_decision_point(early):
-    rng = np.random.default_rng(2)
-    assert_same_bits(early.path, hostile(early.info.width, rng))
-
-
 def mean_of_roots(squares, unit):
     """The mean of the whole roots of squares, in integers but for one division."""
     wholes = []
@@ -217,12 +212,6 @@ def uncertified(early, monkeypatch):
     never = replace(stopping, rules=(replace(stopping.rules[0], error=1.0),))
     monkeypatch.setitem(early.info.stopping, "object", never)
     return early
-
-
-def test_a_task_without_a_certified_rule_says_so(uncertified, make_touch, error):
-    events = decided(uncertified, make_touch(seed=50), error)
-    flags = {task: "uncertified" in event.flags for task, event in events.items()}
-    assert flags == {"category": False, "object": True}
 
 
 @pytest.mark.parametrize("seed", range(50, 56))

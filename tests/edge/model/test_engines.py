@@ -68,12 +68,6 @@ def test_the_models_of_the_checkout_have_the_same_bits_in_both(path):
     assert_same_bits(path, vectors)
 
 
-def test_decision_points_have_the_same_bits_in_both(exported):
-    path = exported / "model.onnx"
-    rng = np.random.default_rng(2)
-    assert_same_bits(path, hostile(Model(path).info.width, rng))
-
-
 @settings(max_examples=RANDOM, deadline=None)
 @given(
     kind=st.sampled_from(
