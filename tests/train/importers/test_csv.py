@@ -258,11 +258,6 @@ RATE = ("--rate", "1")
             "labels.csv: 1 has two rows; remove one of them",
         ),
         (
-            {"1.txt": "1 2\n", "1.csv": "1 2\n"},
-            (*RATE, "--strict"),
-            "in: two trials are named 1",
-        ),
-        (
             {"all.csv": "trial,p1\n../1,2\n"},
             RATE,
             "all.csv: the trial '../1' needs a name ",
