@@ -12,7 +12,7 @@ from onnxruntime import GraphOptimizationLevel
 
 import train
 from edge.classifier import Classifier
-from edge.early import fastest, is_fixed, stopping_rules
+from edge.early import fastest, stopping_rules
 from edge.errors import InputError, OutOfRange
 from edge.events import Decided
 from edge.model.model import Model
@@ -197,6 +197,7 @@ def test_a_task_that_is_never_sure_waits_for_the_last_decision_point_of_its_rule
     category = decided(early, make_touch(seed=50), error)["category"]
     assert category.window_s == early.decision_points_s[1]
     assert category.stopped_by == "window"
+    assert category.error == error
 
 
 @pytest.fixture
@@ -252,6 +253,7 @@ def test_a_touch_like_others_does_not_wait(hasty, make_touch):
     model, error = hasty
     events = decided(model, make_touch(kind="hard", seed=50), error)
     assert stops_of(events) == {(0.3, False)}
+    assert {event.stopped_by for event in events.values()} == {"confidence"}
 
 
 def test_a_touch_unlike_all_others_waits_and_is_flagged(hasty, strange):
@@ -345,7 +347,7 @@ def test_the_board_decides_as_the_trials_that_certified_its_rules_were(
     agreeing, make_touch
 ):
     fitted, model = agreeing
-    recordings = list(pressed(make_touch, range(60, 65)))
+    recordings = list(pressed(make_touch, range(60, 64)))
     vectors = [
         [model.info.vector(first_series(r, model)[1], s) for r in recordings]
         for s in model.decision_points_s
@@ -356,12 +358,10 @@ def test_the_board_decides_as_the_trials_that_certified_its_rules_were(
     }
     _, _, courses = fitted.sequential.judged(np.array(vectors), truth)
     error = model.info.stopping["category"].rules[0].error
+    events = [decided(model, recording, error) for recording in recordings]
     for task, course in courses.items():
-        rule = fastest(model.info.stopping[task], error)
-        stopped_by = "window" if is_fixed(rule) else "confidence"
-        at, wrong = course.under(rule)
-        for i, recording in enumerate(recordings):
-            event = decided(model, recording, error)[task]
-            assert event.window_s == model.decision_points_s[at[i]]
-            assert (event.stopped_by, event.error) == (stopped_by, error)
-            assert (event.label != truth[task][i]) == wrong[i]
+        at, wrong = course.under(fastest(model.info.stopping[task], error))
+        answers = zip(events, at, wrong, truth[task], strict=True)
+        for event, point, is_wrong, label in answers:
+            assert event[task].window_s == model.decision_points_s[point]
+            assert (event[task].label != label) == is_wrong

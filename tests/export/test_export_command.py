@@ -44,14 +44,6 @@ def line_of(printed, task):
     return line
 
 
-def test_it_prints_the_candidates_with_a_star_for_each_task(printed):
-    sets = ("paper ", "contact joints ", "moments ")
-    rows = [line for line in printed.lines if line.startswith(sets)]
-    names = [" ".join(row[:21].split()) for row in rows]
-    assert names == ["paper pca", "contact joints lda", "moments joints lda"]
-    assert "".join(rows).count("*") == 2
-
-
 def test_it_prints_the_accuracy_of_each_task(printed):
     share = "of 16 trials are classified correctly (95 % interval "
     assert share in line_of(printed, "object")

@@ -10,16 +10,6 @@ def test_a_urdf_is_read_between_two_links(urdf):
     assert read_arm(urdf, "base", "tool").dof == 3
 
 
-def test_a_urdf_without_its_links_is_refused(urdf):
-    with pytest.raises(InputError, match="a URDF needs --base and --tip"):
-        read_arm(urdf)
-
-
-def test_links_are_for_a_urdf_alone():
-    with pytest.raises(InputError, match="--base and --tip are for a .urdf file"):
-        read_arm("arm.toml", "base", "tool")
-
-
 def test_a_xacro_file_is_called_one_although_links_are_named(urdf):
     path = urdf.rename(urdf.with_suffix(".urdf.xacro"))
     with pytest.raises(InputError, match="is a xacro macro, not a URDF file"):
