@@ -3,7 +3,7 @@
 import io
 import re
 import shutil
-from contextlib import redirect_stderr, redirect_stdout
+from contextlib import redirect_stderr
 from types import SimpleNamespace
 from unittest.mock import Mock
 
@@ -29,13 +29,12 @@ def test_a_folder_that_cannot_be_written_is_named_before_any_work(tmp_path, caps
 def printed(recordings, tmp_path_factory):
     """What a quick export prints, and the description of its model."""
     folder = tmp_path_factory.mktemp("quick")
-    out = io.StringIO()
     err = io.StringIO()
-    with redirect_stdout(out), redirect_stderr(err):
+    with redirect_stderr(err):
         export(folder, "--data", recordings, "--quick")
     lines = err.getvalue().splitlines()
     info = Model(folder / "model.onnx").info
-    return SimpleNamespace(out=out.getvalue(), lines=lines, info=info)
+    return SimpleNamespace(lines=lines, info=info)
 
 
 def line_of(printed, task):
