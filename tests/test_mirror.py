@@ -6,11 +6,11 @@ from pathlib import Path
 
 ROOT = Path(__file__).parents[1]
 THROUGH = {
+    "edge/touch/several.py": "edge/test_several_contacts.py",
     "train/study": "train/study/test_study_report.py",
     "train/tradeoff": "train/tradeoff/test_tradeoff.py",
     "train/report/work.py": "train/study/test_study_report.py",
     "train/importers/rosbag.py": "train/importers/test_log_importers.py",
-    "train/importers/sources.py": "train/importers/test_csv.py",
     "train/importers/topics.py": "train/importers/test_log_importers.py",
     "train/simulate/truth.py": "train/simulate/test_simulate_truth.py",
 }

@@ -1,6 +1,7 @@
 """Changes of a folder's recordings: by one program at a time, whole or not at all."""
 
 import shutil
+from functools import partial
 from itertools import count
 from pathlib import Path
 
@@ -11,10 +12,7 @@ from edge import saving
 from edge.errors import InputError
 from edge.recording import Recording, load
 from edge.saving import JOURNAL, alone, change_all, find, save, take_back
-
-
-class Killed(BaseException):
-    """A program ends at once."""
+from tests.edge.killed import dies
 
 
 @pytest.fixture
@@ -56,41 +54,18 @@ def undo(days):
         take_back(days)
 
 
-@pytest.fixture
-def dies(monkeypatch):
-    """Do something with folders, and die at a step; whether it died."""
-
-    def run(action, days, last):
-        steps = count()
-
-        def mortal(function):
-            def step(*words, **options):
-                if next(steps) == last:
-                    raise Killed
-                return function(*words, **options)
-
-            return step
-
-        with monkeypatch.context() as patch:
-            for name in ("save", "write_whole"):
-                patch.setattr(saving, name, mortal(getattr(saving, name)))
-            patch.setattr(shutil, "rmtree", mortal(shutil.rmtree))
-            for name in ("mkdir", "rename", "replace", "unlink"):
-                patch.setattr(Path, name, mortal(getattr(Path, name)))
-            try:
-                action(days)
-            except Killed:
-                return True
-            return False
-
-    return run
+STEPS = [
+    *((saving, name) for name in ("save", "write_whole")),
+    (shutil, "rmtree"),
+    *((Path, name) for name in ("mkdir", "rename", "replace", "unlink")),
+]
 
 
 @pytest.mark.parametrize(
     "actions", [[relabel], [delete], [relabel, undo], [delete, undo]]
 )
 def test_a_change_that_is_killed_at_any_step_is_whole_or_has_not_been(
-    actions, new_days, dies
+    actions, new_days
 ):
     *former, action = actions
     states = []
@@ -99,7 +74,7 @@ def test_a_change_that_is_killed_at_any_step_is_whole_or_has_not_been(
         for change in former:
             change(days)
         before = state(days)
-        died = dies(action, days, step)
+        died = dies(partial(action, days), STEPS, step)
         states.append(state(days))
         if not died:
             break
@@ -109,9 +84,9 @@ def test_a_change_that_is_killed_at_any_step_is_whole_or_has_not_been(
     assert states.count(states[-1]) > 1
 
 
-def test_a_change_that_was_finished_later_can_be_taken_back(new_days, dies, caplog):
+def test_a_change_that_was_finished_later_can_be_taken_back(new_days, caplog):
     days = new_days()
-    assert dies(relabel, days, 9)
+    assert dies(partial(relabel, days), STEPS, 9)
     assert {labels["object"] for labels in state(days).values()} == {"cup"}
     assert (
         "finished a change of labels that was interrupted; recordings: " in caplog.text

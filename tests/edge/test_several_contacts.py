@@ -170,6 +170,8 @@ FLICKER = "/".join(["#." * 10, ".#" * 10] * 3)
         ),
         # Where one parts in two, the larger share goes on.
         (["######", "######", PARTED, PARTED], [[6, 6, 3, 3], [2, 2]], [0, 0]),
+        # A region apart from where a contact was is another one.
+        (["##", "##", *["...##"] * 2], [[2, 2, 0, 0], [2, 2]], [0, 0]),
         # A region below the onset count begins nothing.
         (["++", "++", "++"], [], []),
         # A contact ends by itself while another goes on.

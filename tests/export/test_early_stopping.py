@@ -12,7 +12,7 @@ from onnxruntime import GraphOptimizationLevel
 
 import train
 from edge.classifier import Classifier
-from edge.early import fastest, is_fixed, stopping_rules
+from edge.early import fastest, stopping_rules
 from edge.errors import InputError, OutOfRange
 from edge.events import Decided
 from edge.model.model import Model
@@ -58,11 +58,6 @@ def decided(model, recording, error):
     """{task: the decision} of a recording."""
     events = Classifier(model, recording.layout, error=error).classify(recording)
     return {event.task: event for event in events if isinstance(event, Decided)}
-
-
-def test_numpy_gives_the_same_bits_at_every_decision_point(early):
-    rng = np.random.default_rng(2)
-    assert_same_bits(early.path, hostile(early.info.width, rng))
 
 
 def mean_of_roots(squares, unit):
@@ -125,8 +120,13 @@ def test_decision_points_may_have_features_and_directions_of_their_own(
 ):
     X, sequential, model = with_early_settings
     queries = np.random.default_rng(4).normal(size=(9, X.shape[2]))
+    queries *= 10.0 ** np.arange(-2, 7)[:, None]
+    scores = sequential.space_.scores(np.stack([queries] * 3))
     for point, fitted in enumerate(sequential.decision_points_):
         answers = model.run(queries, point)
+        for kind in ("novelty", "remoteness"):
+            assert min(answers[kind]) > 0.0
+            assert (answers[kind] == getattr(scores, kind)[point]).all()
         for task in sequential.choices:
             distances, rows = fitted.tasks_[task].neighbours(queries)
             assert (answers[f"{task}_neighbours"] == rows).all()
@@ -175,17 +175,6 @@ def test_the_golden_file_holds_what_is_answered_at_each_decision_point(early, fo
             np.testing.assert_array_equal(stored, answers[f"{task}_distances"])
 
 
-def test_the_board_stops_where_the_rule_does(early, make_touch, error):
-    rule = stopping_rules(early, error)["category"]
-    for seed in (50, 51, 52):
-        touch = make_touch(kind="soft", seed=seed)
-        decision = decided(early, touch, error)["category"].to_dict()
-        assert decision["window_s"] in early.decision_points_s[: rule.last + 1]
-        assert decision["stopped_by"] == ("window" if is_fixed(rule) else "confidence")
-        assert decision["error"] == error
-        assert 0.0 <= decision["confidence"] <= 1.0
-
-
 def test_a_stream_that_ends_before_any_rule_is_sure_is_decided_at_its_end(
     early,
     make_touch,
@@ -208,6 +197,7 @@ def test_a_task_that_is_never_sure_waits_for_the_last_decision_point_of_its_rule
     category = decided(early, make_touch(seed=50), error)["category"]
     assert category.window_s == early.decision_points_s[1]
     assert category.stopped_by == "window"
+    assert category.error == error
 
 
 @pytest.fixture
@@ -217,12 +207,6 @@ def uncertified(early, monkeypatch):
     never = replace(stopping, rules=(replace(stopping.rules[0], error=1.0),))
     monkeypatch.setitem(early.info.stopping, "object", never)
     return early
-
-
-def test_a_task_without_a_certified_rule_says_so(uncertified, make_touch, error):
-    events = decided(uncertified, make_touch(seed=50), error)
-    flags = {task: "uncertified" in event.flags for task, event in events.items()}
-    assert flags == {"category": False, "object": True}
 
 
 @pytest.mark.parametrize("seed", range(50, 56))
@@ -269,6 +253,7 @@ def test_a_touch_like_others_does_not_wait(hasty, make_touch):
     model, error = hasty
     events = decided(model, make_touch(kind="hard", seed=50), error)
     assert stops_of(events) == {(0.3, False)}
+    assert {event.stopped_by for event in events.values()} == {"confidence"}
 
 
 def test_a_touch_unlike_all_others_waits_and_is_flagged(hasty, strange):
@@ -362,7 +347,7 @@ def test_the_board_decides_as_the_trials_that_certified_its_rules_were(
     agreeing, make_touch
 ):
     fitted, model = agreeing
-    recordings = list(pressed(make_touch, range(60, 65)))
+    recordings = list(pressed(make_touch, range(60, 64)))
     vectors = [
         [model.info.vector(first_series(r, model)[1], s) for r in recordings]
         for s in model.decision_points_s
@@ -373,28 +358,10 @@ def test_the_board_decides_as_the_trials_that_certified_its_rules_were(
     }
     _, _, courses = fitted.sequential.judged(np.array(vectors), truth)
     error = model.info.stopping["category"].rules[0].error
+    events = [decided(model, recording, error) for recording in recordings]
     for task, course in courses.items():
         at, wrong = course.under(fastest(model.info.stopping[task], error))
-        for i, recording in enumerate(recordings):
-            event = decided(model, recording, error)[task]
-            assert event.window_s == model.decision_points_s[at[i]]
-            assert (event.label != truth[task][i]) == wrong[i]
-
-
-@pytest.mark.parametrize("kind", ["novelty", "remoteness"])
-def test_the_graph_scores_doubt_as_the_estimator_does(early, tmp_path, kind):
-    rng = np.random.default_rng(4)
-    X = rng.normal(size=(3, 60, early.info.width))
-    labels = np.repeat(["a", "b", "c"], 20)
-    choices = {"t": Choice("none", 4, 3)}
-    path = tmp_path / "model.onnx"
-    sequential, _ = fitted_model(path, early.info, choices, X, {"t": labels})
-    vectors = rng.normal(size=(9, early.info.width))
-    vectors *= 10.0 ** np.arange(-2, 7)[:, None]
-    scores = getattr(sequential.space_.scores(np.stack([vectors] * 3)), kind)
-    assert scores.min() > 0.0
-    for engine in ("onnxruntime", "numpy"):
-        loaded = Model(path, engine)
-        for point, expected in enumerate(scores.tolist()):
-            outputs = [float(loaded.run(v[None], point)[kind][0]) for v in vectors]
-            assert outputs == expected
+        answers = zip(events, at, wrong, truth[task], strict=True)
+        for event, point, is_wrong, label in answers:
+            assert event[task].window_s == model.decision_points_s[point]
+            assert (event[task].label != label) == is_wrong

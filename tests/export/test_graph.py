@@ -2,7 +2,6 @@
 reference."""
 
 from collections import Counter
-from dataclasses import replace
 
 import numpy as np
 import onnx
@@ -14,8 +13,7 @@ from onnx.reference import ReferenceEvaluator
 from edge.model.model import Model
 from export.graph import to_onnx
 from tests.hard_cases import exact
-from tests.hard_cases.models import describe, features, labels_for, session, shipped
-from tests.sequential import fitted_model
+from tests.hard_cases.models import describe, features, labels_for, session
 from train.model.pipeline import Choice, ContactClassifier, vote
 from train.model.scaling import SCALINGS
 
@@ -184,17 +182,6 @@ def test_an_ulp_more_in_every_feature_changes_no_bit(export):
         assert values.tobytes() == moved[name].tobytes(), name
 
 
-def test_every_task_of_a_sequential_model_obeys_the_estimators(tmp_path):
-    X = np.stack([features(40, seed) for seed in (1, 2, 3)])
-    y = {"t": labels_for(X[0], 3), "u": labels_for(X[0], 2, 1)}
-    choices = {"t": Choice("IV", 6, 3), "u": Choice("IV", 2, 2, "lda")}
-    info = replace(shipped().info, decision_points_s=(0.4, 0.8, 1.2))
-    fitted, model = fitted_model(tmp_path / "model.onnx", info, choices, X, y)
-    queries = features(20, seed=9)
-    for point, estimator in enumerate(fitted.decision_points_):
-        assert differences(estimator, model.run(queries, point), queries) == []
-
-
 @pytest.mark.parametrize(
     "choice",
     [
@@ -232,20 +219,6 @@ def test_tasks_of_one_space_share_its_projection_but_not_their_rows(export):
     assert matrices == weights | rows | ballots
     (opset,) = proto.opset_import
     assert opset.domain == ""
-
-
-def test_features_within_the_training_set_are_in_range_and_far_ones_are_not(export):
-    """Cut off at 4 to 8 times the largest difference, and at coordinates of twice the
-    longest row: the graph says whether, over all spaces."""
-    X = features(60)
-    _, model = export(X, {"t": Choice("IV", 6, 3), "u": Choice("none", 6, 3)})
-    middle = X.mean(axis=0)
-    assert not model.run(X)["out_of_range"].any()
-    far = middle + np.outer([1.0, 100.0, 1e6], X[0] - middle)
-    assert model.run(far)["out_of_range"].tolist() == [0.0, 1.0, 1.0]
-    single = middle.copy()
-    single[7] += 9.0 * np.abs(X - middle)[:, :40].max()
-    assert model.decide(single)["t"].out_of_range
 
 
 @pytest.mark.parametrize("k", [1, 2, 3])

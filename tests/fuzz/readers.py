@@ -21,14 +21,14 @@ from edge.tools.explanation import Space
 from edge.touch.arm import Chain
 from tests.edge.touch.test_urdf import ARM
 from tests.fuzz import mutate
-from tests.train.importers.test_importers import dsa
-from tests.train.importers.test_log_importers import (
+from tests.train.importers.ros import (
     FRAMES,
     array,
     skin,
     write_bag,
     write_mcap,
 )
+from tests.train.importers.test_importers import dsa
 from train.__main__ import main as train_main
 from train.simulate.scene import load as load_scene
 

@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from train.model.novelty import CLIP, FARTHEST, STEP_BITS
 from train.model.projection import MOST_STEPS
 
 
@@ -109,3 +110,32 @@ def root(square):
 def distance(square, unit):
     """The root of a whole number, rounded once, in units of a power of two."""
     return root(square) * unit
+
+
+def doubt(space, point, vectors):
+    """{name: (n,)} novelty and remoteness of vectors at a decision point, by the rule of
+    `train.model.novelty`."""
+    at = space.points[point]
+    steps = rounded((vectors - at.mean) * at.gain)
+    steps = np.clip(steps, -int(CLIP * 2**STEP_BITS), int(CLIP * 2**STEP_BITS))
+    inside = rounded(steps @ multiples(space.weights, 1.0), Fraction(2) ** -space.shift)
+    squares = (steps**2).sum(axis=1) - (inside**2).sum(axis=1)
+    whitening = multiples(at.whitening, 1.0)
+    places = rounded(inside @ whitening, Fraction(2) ** -at.shift)
+    places = np.clip(places, -int(FARTHEST), int(FARTHEST))
+    rows = multiples(at.rows, 1.0)
+    quarters = multiples(4.0 * at.weights, 1.0)
+    novelty = []
+    remoteness = []
+    for outside, place in zip(squares.tolist(), places, strict=True):
+        apart = rows - place
+        closest = min((apart**2).sum(axis=1).tolist())
+        weighted = ((apart * quarters) ** 2).sum(axis=1).tolist()
+        scaled = [
+            float(Fraction(square, 16) * Fraction(near))
+            for square, near in zip(weighted, at.nearness.tolist(), strict=True)
+        ]
+        remoteness.append(math.sqrt(min(scaled)))
+        product = float(Fraction(root(max(outside, 1))) * Fraction(root(closest)))
+        novelty.append(float(Fraction(product) * Fraction(at.unit)))
+    return {"novelty": np.array(novelty), "remoteness": np.array(remoteness)}

@@ -5,7 +5,6 @@ states. It shares no code with the graph, with `train` or with `edge`: it comput
 whole numbers and fractions, and rounds where IEEE 754 says that an operation rounds.
 """
 
-import math
 from fractions import Fraction
 from functools import cache
 
@@ -19,7 +18,6 @@ from tests.hard_cases.cases import SEEDS, Case, Ladder, decades, powers_of_ten
 from tests.hard_cases.models import exported, features, one_by_one
 from tests.hard_cases.neighbours import near_duplicates, offset_data
 from train.data.folds import stratified_folds
-from train.model.novelty import CLIP, FARTHEST, STEP_BITS
 from train.model.pipeline import Choice
 from train.model.stopping import SequentialClassifier
 
@@ -102,7 +100,7 @@ class Whole:
         cut = np.any([projected.cut for projected in spaces.values()], axis=0)
         expected = {
             "out_of_range": cut.astype(np.float64),
-            **self._doubt(vectors, point),
+            **exact.doubt(self.fitted.space_, point, vectors),
         }
         for task in CHOICES:
             points = spaces[fitted.tasks_[task].space].units
@@ -137,35 +135,6 @@ class Whole:
         columns_of = zip(*answers, strict=True)
         named = zip(TASK_OUTPUTS, columns_of, strict=True)
         return {f"{task}_{end}": np.array(column) for end, column in named}
-
-    def _doubt(self, vectors, point):
-        space = self.fitted.space_
-        at = space.points[point]
-        steps = exact.rounded((vectors - at.mean) * at.gain)
-        steps = np.clip(steps, -int(CLIP * 2**STEP_BITS), int(CLIP * 2**STEP_BITS))
-        whole = exact.multiples(space.weights, 1.0)
-        inside = exact.rounded(steps @ whole, Fraction(2) ** -space.shift)
-        squares = (steps**2).sum(axis=1) - (inside**2).sum(axis=1)
-        whitening = exact.multiples(at.whitening, 1.0)
-        places = exact.rounded(inside @ whitening, Fraction(2) ** -at.shift)
-        places = np.clip(places, -int(FARTHEST), int(FARTHEST))
-        rows = exact.multiples(at.rows, 1.0)
-        quarters = exact.multiples(4.0 * at.weights, 1.0)
-        novelty = []
-        remoteness = []
-        for outside, place in zip(squares.tolist(), places, strict=True):
-            apart = rows - place
-            nearest = min((apart**2).sum(axis=1).tolist())
-            weighted = ((apart * quarters) ** 2).sum(axis=1).tolist()
-            scaled = [
-                float(Fraction(square, 16) * Fraction(near))
-                for square, near in zip(weighted, at.nearness.tolist(), strict=True)
-            ]
-            remoteness.append(math.sqrt(min(scaled)))
-            lengths = exact.root(max(outside, 1)), exact.root(nearest)
-            product = float(Fraction(lengths[0]) * Fraction(lengths[1]))
-            novelty.append(float(Fraction(product) * Fraction(at.unit)))
-        return {"novelty": np.array(novelty), "remoteness": np.array(remoteness)}
 
 
 def _far(label, labels, squares, scale):

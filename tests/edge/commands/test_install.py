@@ -1,8 +1,6 @@
 """A model takes the place of another, and gives it back."""
 
 import shutil
-from contextlib import suppress
-from itertools import count
 from pathlib import Path
 
 import onnx
@@ -12,11 +10,8 @@ from edge.commands import install
 from edge.model.model import Model
 from edge.model.verify import golden_of
 from tests.conftest import sealed
+from tests.edge.killed import dies
 from tests.edge.test_writing import left_by_a_dead_run
-
-
-class Killed(BaseException):
-    """A program ends at once."""
 
 
 @pytest.fixture
@@ -89,33 +84,12 @@ def test_without_a_former_model_there_is_no_way_back(edge, running):
     assert "has no former model to go back to" in err
 
 
-@pytest.fixture
-def dies(monkeypatch):
-    """Do something, and die before a step of writing."""
-
-    def run(action, last):
-        steps = count()
-
-        def mortal(function):
-            def step(*words):
-                if next(steps) == last:
-                    raise Killed
-                return function(*words)
-
-            return step
-
-        with monkeypatch.context() as patch, suppress(Killed):
-            patch.setattr(install, "prove", lambda *words: None)
-            patch.setattr(install, "_write", mortal(install._write))
-            patch.setattr(Path, "replace", mortal(Path.replace))
-            action()
-
-    return run
+STEPS = (install, "_write"), (Path, "replace")
 
 
 @pytest.mark.parametrize("action", ["install", "back"])
 def test_a_kill_at_any_step_loses_no_model_and_mixes_none(
-    edge, installed, new, old, running, dies, action
+    edge, installed, new, old, running, monkeypatch, action
 ):
     """The model that runs has its golden file, and both models are there."""
     installed()
@@ -124,10 +98,12 @@ def test_a_kill_at_any_step_loses_no_model_and_mixes_none(
     third.doc_string = "third"
     new.write_bytes(sealed(third))
     back = ("install", "--back", "--to", running)
+    monkeypatch.setattr(install, "prove", lambda *words: None)
     for step in range(4):
         running.write_bytes(first)
         running.with_name("model.onnx.former").write_bytes(old)
-        dies(installed if action == "install" else lambda: edge(*back), step)
+        change = installed if action == "install" else lambda: edge(*back)
+        dies(change, STEPS, step)
         models = [running.read_bytes()]
         golden = golden_of(running, Model(running).version)
         assert golden.is_file() == (models[0] != old)

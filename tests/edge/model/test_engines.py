@@ -32,7 +32,8 @@ def assert_same_bits(path, vectors):
             expected = runtime.run(vector[None], point)
             answer = graph.run(vector[None], point)
             assert answer.keys() == expected.keys()
-            assert answer["out_of_range"] == expected["out_of_range"]
+            for name in {"out_of_range", "novelty", "remoteness"} & expected.keys():
+                assert answer[name].tobytes() == expected[name].tobytes()
             for task in runtime.info.tasks:
                 assert_same_answer(task, answer, expected)
 
@@ -66,12 +67,6 @@ def test_the_models_of_the_checkout_have_the_same_bits_in_both(path):
     if golden.exists():
         vectors = np.concatenate([vectors, np.load(golden)["vectors"]])
     assert_same_bits(path, vectors)
-
-
-def test_decision_points_have_the_same_bits_in_both(exported):
-    path = exported / "model.onnx"
-    rng = np.random.default_rng(2)
-    assert_same_bits(path, hostile(Model(path).info.width, rng))
 
 
 @settings(max_examples=RANDOM, deadline=None)

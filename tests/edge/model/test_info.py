@@ -17,7 +17,7 @@ from edge.model.info import (
     margin,
 )
 from edge.model.metadata_reader import read_remoteness, read_stopping
-from edge.model.refusal import TEST_SHARE, refusal
+from edge.model.refusal import refusal
 from edge.model.unusual import unusual
 
 
@@ -94,9 +94,6 @@ def test_a_refusal_names_the_smallest_error_and_how_many_trials_would_do():
         math.comb(trials, k) * 0.08**k * 0.92 ** (trials - k) for k in range(wrong + 1)
     )
     assert 0.0025 < tail <= 0.05
-    # Chernoff's bound: the level over the divergence of the two shares.
-    divergence = 0.95 * math.log(0.95 / 0.92) + 0.05 * math.log(0.05 / 0.08)
-    assert trials == math.ceil(-math.log(TEST_SHARE * 0.1) / divergence)
 
 
 def test_a_refusal_asks_for_more_trials_than_there_were():

@@ -184,11 +184,6 @@ def test_a_deleted_recording_never_replaces_a_newer_one(kept, edge, refused):
     assert len(find([str(kept)])) == 5
 
 
-def test_nothing_is_deleted_without_a_word(kept, refused):
-    assert "add --yes to do it" in refused("label", kept, "--delete")
-    assert len(find([str(kept)])) == 4
-
-
 def test_that_no_touch_is_of_a_kind_is_said(kept, edge):
     status, _, err = edge("label", kept / "sure.npz", "--only", "wrong")
     assert status == 1

@@ -1,11 +1,9 @@
 """The live page shows frames, contacts and decisions, and relabels and deletes
 trials."""
 
-import re
 import shutil
 from contextlib import ExitStack, closing
 from dataclasses import replace
-from importlib import resources
 
 import numpy as np
 import pytest
@@ -298,31 +296,6 @@ def test_a_picture_tells_when_the_list_has_changed(folder_page, pictures):
     folder_page.push(replace(still, t=1.0))
     before, after = (picture["trials"] for picture in pictures)
     assert after > before
-
-
-THEME = re.compile(r"--([\w-]+): (#[0-9a-f]{6});")
-
-
-def luminance(colour):
-    """The relative luminance of WCAG 2, of #rrggbb."""
-    channels = np.array(list(bytes.fromhex(colour[1:]))) / 255
-    linear = np.where(
-        channels <= 0.04045,
-        channels / 12.92,
-        ((channels + 0.055) / 1.055) ** 2.4,
-    )
-    return float(linear @ (0.2126, 0.7152, 0.0722))
-
-
-def test_the_weakest_contact_stands_out_from_every_rest_in_both_themes():
-    css = resources.files("edge.tools").joinpath("pages/page.css").read_text()
-    light_part, dark_part = css.split("@media (prefers-color-scheme: dark)")
-    light = dict(THEME.findall(light_part))
-    for theme in (light, {**light, **dict(THEME.findall(dark_part))}):
-        weak = luminance(theme["weak"])
-        for ground in ("rest-low", "rest-high", "panel"):
-            darker, brighter = sorted((weak, luminance(theme[ground])))
-            assert (brighter + 0.05) / (darker + 0.05) >= 3.0
 
 
 def until(condition, page, stream, browser):

@@ -1,5 +1,6 @@
 """The choice of settings and of the window."""
 
+from collections import defaultdict
 from dataclasses import replace
 from types import SimpleNamespace
 
@@ -104,22 +105,20 @@ def agreeing():
 
 @pytest.fixture(scope="module")
 def hits(agreeing):
-    """{task: whether models without a trial's fold name its label}, and the same of
-    category where it is decided by itself."""
+    """{task: whether models without a trial's fold name its label}, and the same where it
+    is decided alone."""
     vectors, choices, folds = agreeing
-    right = {task: np.zeros(60, dtype=bool) for task in (*choices, "alone")}
+    right = defaultdict(lambda: np.zeros(60, dtype=bool))
     for fold in range(5):
         test = folds == fold
         X = vectors.X[test]
         model = ContactClassifier.of(choices, vectors.part(~test))
-        answers = {task: decision.labels for task, decision in model.decide(X).items()}
-        category = model.tasks_["category"]
-        near = category.nearest(category.squares(X))
-        answers["alone"] = vote(category.labels[near])
-        for task, labels in answers.items():
-            of_task = "category" if task == "alone" else task
-            named = model.tasks_[of_task].classes[labels]
-            right[task][test] = named == vectors.y[of_task][test]
+        for task, decision in model.decide(X).items():
+            fitted = model.tasks_[task]
+            alone = vote(fitted.labels[fitted.nearest(fitted.squares(X))])
+            truth = vectors.y[task][test]
+            right[task][test] = fitted.classes[decision.labels] == truth
+            right[f"{task} alone"][test] = fitted.classes[alone] == truth
     return right
 
 
@@ -138,29 +137,20 @@ def test_tasks_that_agree_are_scored_as_they_are_decided_together(agreeing, hits
         assert settings.by_fold == (choices,) * 5
 
 
-def test_a_task_with_groups_is_scored_by_single_trials_too(agreeing):
+def test_a_task_with_groups_is_scored_by_single_trials_too(agreeing, hits):
     vectors, choices, folds = agreeing
     mobility = replace(vectors, y={"mobility": vectors.y["mobility"]})
-    right = 0
-    for fold in range(5):
-        others = mobility.part(folds != fold)
-        test = mobility.part(folds == fold)
-        model = ContactClassifier.of({"mobility": choices["mobility"]}, others)
-        labels = model.decide(test.X)["mobility"].labels
-        named = model.tasks_["mobility"].classes[labels]
-        right += (named == test.y["mobility"]).sum()
     none_right = Promise(0, 60, hits=np.zeros(60, dtype=bool))
     chosen = {"mobility": Chosen(choices["mobility"], none_right, none_right, "object")}
-    alone = {"mobility": choices["mobility"]}
-    plans = {left_out: (folds, [alone] * 5) for left_out in ("trial", "object")}
+    plans = {left_out: (folds, [choices] * 5) for left_out in ("trial", "object")}
     settings = decided_together(chosen, mobility, plans)["mobility"]
-    assert settings.by_trial.right == right
+    assert settings.by_trial.right == hits["mobility alone"].sum()
 
 
 def test_a_category_is_right_where_both_of_its_factors_are(hits):
     of_factors = hits["mobility"] & hits["softness"]
     assert (hits["category"] == of_factors).all()
-    assert (hits["category"] != hits["alone"]).any()
+    assert (hits["category"] != hits["category alone"]).any()
 
 
 FEW = {

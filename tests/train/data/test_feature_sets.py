@@ -108,18 +108,6 @@ def test_a_vector_has_the_widths_that_are_told(name, samples):
     assert np.isfinite(vector).all()
 
 
-def test_widths_are_those_of_courses_cells_joints_and_single_numbers():
-    features = [
-        "max_force",
-        "max_force_mean",
-        "taxel_force@10",
-        "sqrt_taxel_force_deviation",
-    ]
-    assert widths(features, 40, SKIN) == (40, 1, 230, 23)
-    features = ["joint_change", "joint_angle_mean@9", "taxel_force", "max_force_rate@3"]
-    assert widths(features, 4, SKIN, 7) == (28, 7, 92, 3)
-
-
 def test_a_name_says_its_own_number_of_times():
     vector = vector_of(
         touch(PEAKS),

@@ -166,12 +166,6 @@ def test_joint_angles_in_rows_of_their_own_are_interpolated(folder, capsys):
     assert "lacks joint angles for 1 of 2 frames" in capsys.readouterr().out
 
 
-def test_labels_that_tell_all_trials_apart_are_said(folder, capsys):
-    put(folder, {f"acrylic_{n}_hold.csv": "t,s1,s2\n0,1,2\n1,3,4\n" for n in range(4)})
-    imported(folder, "--time-unit", "s")
-    assert "each trial has a label of its own" in capsys.readouterr().out
-
-
 def test_joints_fractions_gaps_and_files_beside(folder):
     rows = [[0.5 * i, "nan", 90, -90] for i in range(3)]
     files = {
@@ -258,11 +252,6 @@ RATE = ("--rate", "1")
             "labels.csv: 1 has two rows; remove one of them",
         ),
         (
-            {"1.txt": "1 2\n", "1.csv": "1 2\n"},
-            (*RATE, "--strict"),
-            "in: two trials are named 1",
-        ),
-        (
             {"all.csv": "trial,p1\n../1,2\n"},
             RATE,
             "all.csv: the trial '../1' needs a name ",
@@ -325,58 +314,6 @@ def test_generated_tables_arrive_as_they_were(tmp_path_factory, table):
     assert recording.t == pytest.approx(STEP_S * np.arange(len(values)))
 
 
-TRIAL = "t,p1\n0,1\n0.1,2\n"
-
-
-@pytest.mark.parametrize(
-    "name",
-    [
-        "{}/trial_1/x.csv",
-        "{}_1.csv",
-        "{}/exp3/day_2/x.csv",
-        "{}/2024-03-01/x.csv",
-    ],
-)
-def test_a_label_is_no_folder_that_counts_trials(folder, name):
-    put(folder, {name.format(label): TRIAL for label in ("cup", "pen")})
-    _, recordings = imported(folder)
-    labels = [recording.labels["object"] for recording in recordings.values()]
-    assert labels == ["cup", "pen"]
-
-
-def test_numbered_folders_are_labels_where_none_is_above_them(folder, capsys):
-    put(folder, {"box_1/a.csv": TRIAL, "box_2/a.csv": TRIAL})
-    _, recordings = imported(folder)
-    assert recordings["box_2_a"].labels == {"object": "box_2"}
-    output = capsys.readouterr().out
-    assert 'label: the folder\'s name, such as "box_1"' in output
-
-
-def test_files_that_are_only_numbered_have_no_label(folder, capsys):
-    put(folder, {"001.csv": TRIAL, "002.csv": TRIAL})
-    _, recordings = imported(folder)
-    assert recordings["001"].labels == {}
-    assert "label: none, as the files' names only count" in capsys.readouterr().out
-
-
-def test_hidden_files_and_other_formats_are_not_read(folder):
-    hidden = {"._cup_1.csv": b"\0", ".cache/cup_2.csv": TRIAL}
-    foreign = {"cup_3.xlsx": b"PK", "skin.json": "{}"}
-    put(folder, {"cup_1.csv": TRIAL} | hidden | foreign)
-    status, recordings = imported(folder)
-    assert status == 0
-    assert list(recordings) == ["cup_1"]
-
-
-def test_the_columns_are_those_of_most_files(folder, capsys):
-    files = {f"cup_{i}.csv": TRIAL for i in range(3)}
-    put(folder, {"a_1.csv": TRIAL.replace("p1", "u1")} | files)
-    status, recordings = imported(folder)
-    assert status == 1
-    assert list(recordings) == ["cup_0", "cup_1", "cup_2"]
-    assert "a_1.csv: its taxels are ['u1'], and those of" in capsys.readouterr().err
-
-
 ROWS = range(8)
 UNNAMED = {
     "rows": [[f"{i} {7 - i % 2}\n" for i in ROWS]],
@@ -408,39 +345,6 @@ def test_a_column_that_stays_the_same_in_all_trials_is_a_taxel(folder):
     status, recordings = imported(folder, *RATE)
     assert status == 0
     assert recordings["1"].frames.shape == (8, 1, 2)
-
-
-def test_of_two_trials_of_one_name_the_first_is_imported(folder, capsys):
-    put(folder, {"cup_1.csv": TRIAL, "cup_1.txt": TRIAL, "cup_2.csv": TRIAL})
-    status, recordings = imported(folder)
-    assert status == 1
-    assert list(recordings) == ["cup_1", "cup_2"]
-    assert "two trials are named cup_1; rename one" in capsys.readouterr().err
-
-
-def test_labels_of_no_file_and_files_without_labels_are_named(folder, capsys):
-    labels = "trial,object\nr0,box\nR1,cup\n"
-    put(folder, {"r0.csv": TRIAL, "r1.csv": TRIAL, "labels.csv": labels})
-    status, recordings = imported(folder)
-    err = capsys.readouterr().err
-    assert status == 1
-    assert recordings["r0"].labels == {"object": "box"}
-    assert recordings["r1"].labels == {}
-    assert "R1 names no file" in err
-    assert "has no row for r1" in err
-
-
-def test_a_row_of_a_file_that_is_not_imported_is_no_slip(folder, capsys):
-    files = {"r0.csv": TRIAL, "r1.csv": b"\0", "r2.csv": "t,p1\n0,x\n"}
-    labels = "trial,object\nr0,box\nr1,cup\nr2,cup\n"
-    put(folder, files | {"labels.csv": labels})
-    _, recordings = imported(folder)
-    assert list(recordings) == ["r0"]
-    error = capsys.readouterr().err
-    assert "r1.csv: not a table: it is not text" in error
-    assert "names no file" not in error
-    out = str(folder.parent / "one")
-    assert main(["import", "csv", str(folder / "r0.csv"), "--out", out]) == 0
 
 
 def test_numbers_of_columns_count_in_the_file_as_it_stands(folder):
@@ -546,11 +450,3 @@ def test_labels_and_the_names_of_trials_stand_as_they_are(folder):
     assert {
         name: trial.labels["object"] for name, trial in recordings.items()
     } == labels
-
-
-def test_a_label_that_is_a_number_stands_as_it_is(folder):
-    table = "trial,object,softness\n1,012,\n2,None,1\n"
-    put(folder, {"1.txt": "1 2\n1 3\n", "2.txt": "1 2\n1 3\n", "labels.csv": table})
-    _, recordings = imported(folder, *RATE)
-    assert recordings["1"].labels == {"object": "012"}
-    assert recordings["2"].labels == {"object": "None", "softness": "1"}

@@ -1,11 +1,11 @@
 """Novelty: a score in whole numbers, and limits that held-out trials set."""
 
 import math
-from fractions import Fraction
 
 import numpy as np
 import pytest
 
+from tests.hard_cases import exact
 from train.data.folds import stratified_folds
 from train.model.novelty import (
     CLIP,
@@ -30,42 +30,14 @@ def trials(n, seed=0, points=2):
     return X * np.repeat([1.0, 1e-4], WIDTHS), labels
 
 
-def integers(values):
-    """Whole numbers as Python's integers, which never overflow."""
-    return values.astype(np.int64).astype(object)
-
-
-def scores_by_hand(space, x):
-    """Novelty and remoteness of a vector at the first decision point, in integers."""
-    point = space.points[0]
-    most = int(CLIP * 2**STEP_BITS)
-    deviations = map(round, ((x - point.mean) * point.gain).tolist())
-    steps = np.array([min(max(d, -most), most) for d in deviations], dtype=object)
-    z = shifted(steps @ integers(space.weights), space.shift)
-    y = shifted(z @ integers(point.whitening), point.shift)
-    outside = max((steps**2).sum() - (z**2).sum(), 1)
-    apart = integers(point.rows) - y
-    squares = (apart**2).sum(axis=1)
-    quarters = apart * integers(4.0 * point.weights)
-    remote = min((quarters**2).sum(axis=1).astype(float) / 16.0 * point.nearness)
-    novelty = math.sqrt(outside) * math.sqrt(squares.min()) * point.unit
-    return novelty, math.sqrt(remote)
-
-
-def shifted(totals, shift):
-    """Integers divided by 2^shift, and rounded half to even."""
-    return np.array([round(Fraction(total, 1 << shift)) for total in totals], object)
-
-
 def test_the_score_is_that_of_integers():
     X, labels = trials(60)
     space = NoveltySpace.of(X, labels, WIDTHS)
     new, _ = trials(20, seed=5)
     new[0, 10:] *= 3.0
-    novelty, remoteness = zip(*(scores_by_hand(space, x) for x in new[0]), strict=True)
-    assert min(novelty) > 0.0
-    assert space.scores(new).novelty[0].tolist() == list(novelty)
-    assert space.scores(new).remoteness[0].tolist() == list(remoteness)
+    for name, values in exact.doubt(space, 0, new[0]).items():
+        assert min(values) > 0.0
+        assert getattr(space.scores(new), name)[0].tolist() == values.tolist()
 
 
 def test_no_whole_number_reaches_2_to_the_53():

@@ -160,18 +160,6 @@ def with_joints(fitted, change):
     return replace(fitted, measured=replace(fitted.measured, trials=tuple(trials)))
 
 
-def test_a_joint_angle_beyond_its_limits_is_named_with_file_and_frame(fitted):
-    def change(i, joints):
-        joints = joints.copy()
-        joints[7, 2] = 1e4 if i == 1 else joints[7, 2]
-        return joints
-
-    (line,) = warnings_with(with_joints(fitted, change), "beyond its limits")
-    path = fitted.measured.trials[1].path
-    assert f"{path}: at frame 7 joint upper_arm_roll is at 10000" in line
-    assert warnings_with(fitted, "beyond its limits") == []
-
-
 def test_angles_in_degrees_name_some_recordings_and_count_the_others(fitted):
     wrong = with_joints(fitted, lambda _, joints: np.degrees(joints))
 

@@ -2,9 +2,6 @@
 
 import json
 import re
-import sys
-import types
-from functools import partial
 from itertools import product
 
 import pytest
@@ -61,11 +58,6 @@ def everything():
     return [*objects, {**objects[-1], "name": "plant", "stem_count": 6}]
 
 
-def batch_of(trial_scene, index=0):
-    effects, specs = list(kinds(trial_scene).items())[index]
-    return run_batch(trial_scene, tuple(specs)), effects
-
-
 def test_an_effect_not_called_for_is_not_loaded():
     program = (
         "import json, sys\nfrom train.simulate.scene import from_dict\nfrom "
@@ -76,23 +68,6 @@ def test_an_effect_not_called_for_is_not_loaded():
         "sys.modules if m.startswith('train.simulate.effects.')]))\n"
     )
     assert json.loads(python("-c", program).stdout) == ["train.simulate.effects.base"]
-
-
-@pytest.mark.parametrize("add", [(), ("noise", "tilt")])
-def test_uncalled_effects_may_raise_and_no_bit_changes(monkeypatch, add):
-    trial_scene = scene(*add)
-    before = [batch_of(trial_scene, i)[0] for i in range(2)]
-    for i, effects in enumerate(kinds(trial_scene)):
-        for name in EFFECTS:
-            if name not in effects:
-                bomb = types.ModuleType(name)
-                fail = partial(pytest.fail, f"{name} was touched")
-                bomb.__getattr__ = lambda attribute, fail=fail: fail()
-                monkeypatch.setitem(sys.modules, f"train.simulate.effects.{name}", bomb)
-        after = batch_of(trial_scene, i)[0]
-        monkeypatch.undo()
-        assert before[i].counts.tobytes() == after.counts.tobytes()
-        assert before[i].joints.tobytes() == after.joints.tobytes()
 
 
 def modules_of(effects):
