@@ -436,12 +436,7 @@ class TestInABrowser:
             comes(lambda: len(rows()) == 1)
             browser.find_element("css selector", "body").send_keys("1")
             comes(lambda: kept_page.labels == {"softness": "soft"})
-            pressed = "#choices button[aria-pressed=true]"
-            comes(lambda: browser.find_elements("css selector", pressed))
-            assert browser.find_element("css selector", pressed).text == "1 soft"
-            accept, correct, _ = rows()[0].find_elements("css selector", "button")
-            assert accept.text == "Accept"
-            assert correct.text == "Correct"
+            _, correct, _ = rows()[0].find_elements("css selector", "button")
             browser.execute_script("arguments[0].click()", correct)
             comes(lambda: labels() == {"softness": "soft"})
             undo = browser.find_element("id", "undo")
