@@ -65,6 +65,7 @@ def early_settings(make_touch, folder, arm, k):
         touch = make_touch(kind=kind, seed=seed, arm=arm, labels={"softness": kind})
         save(folder / f"{kind}-{seed}.npz", touch)
     early = [c for c in candidates({}, joints=arm) if c.early or not arm]
+    early = early[:2]
     dataset = load_trials([folder], Measurement(features_of(early)))
     y = {"softness": dataset.labels("softness")}
     choosing = Choosing(dataset, y, early, Divisions.of(dataset, y), samples=10)
