@@ -9,18 +9,9 @@ import pytest
 from edge.answers import contact_doubts
 from edge.classifier import Classifier
 from edge.errors import InputError
-from edge.events import Decided
 from edge.model.model import Model
+from tests.edge.test_classifier import decided, decisions
 from tests.edge.touch.test_joint_doubts import RATE, series, stopped
-
-
-def decided(model, recording):
-    """The decisions on a recording."""
-    return decisions(Classifier(model).classify(recording))
-
-
-def decisions(events):
-    return [event for event in events if isinstance(event, Decided)]
 
 
 def without_a_pose(touch):
