@@ -11,6 +11,7 @@ from edge.classifier import Classifier
 from edge.errors import InputError
 from edge.events import Aside, Decided, Onset, Release
 from tests.conftest import in_a_row
+from train.data.parts import part
 
 
 def watch(model, recording):
@@ -138,12 +139,7 @@ def test_a_stuck_taxel_is_named_and_hides_no_touch(model, make_touch):
 def test_a_touch_that_began_before_the_recording_is_flagged_late(model, make_touch):
     recording = make_touch(seed=3)
     first = int(np.searchsorted(recording.t, 0.35))
-    cut = replace(
-        recording,
-        t=recording.t[first:],
-        frames=recording.frames[first:],
-        joints=recording.joints[first:],
-    )
+    cut = part(recording, slice(first, None))
     events = decided(model, cut)
     assert [event.onset_s for event in events] == [cut.t[0]] * 2
     assert ["late" in event.flags for event in events] == [True] * 2
