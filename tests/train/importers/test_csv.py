@@ -100,7 +100,6 @@ def imported(folder, *words):
         a_file_for_each_frame,
         a_numbered_file_for_each_frame,
     ],
-    ids=lambda form: form.__name__,
 )
 def test_the_same_trial_comes_out_of_every_form(form, folder):
     words = form(folder) or []
