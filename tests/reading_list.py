@@ -1,10 +1,9 @@
 """The core: the modules that `edge-classify run` loads for Cody's skin on I2C.
 
-`python -m tests.reading_list` prints them with their lines of code, in the order in
-which a frame passes their rooms.
+`python -m tests.reading_list` prints them in the order in which a frame passes their
+rooms.
 """
 
-import ast
 import subprocess
 import sys
 from pathlib import Path
@@ -51,25 +50,10 @@ def _room(path):
     return ROOMS.index(path.parent.name)
 
 
-def lines_of_code(path):
-    """Lines of a module without blank lines, comments and docstrings."""
-    text = (ROOT / path).read_text()
-    lines = {number: line.strip() for number, line in enumerate(text.splitlines(), 1)}
-    for node in ast.walk(ast.parse(text)):
-        match node:
-            case ast.Expr(value=ast.Constant(), lineno=first, end_lineno=last):
-                for number in range(first, last + 1):
-                    lines[number] = ""
-    return sum(line != "" and not line.startswith("#") for line in lines.values())
-
-
 def main():
     """Print the list; the skin's buses need not be there."""
     skin = str(skinfile.shipped("cody"))
-    paths = loaded("run", "--model", str(demo.MODEL), "--skin", skin)
-    for path in paths:
-        print(f"{lines_of_code(path):5}  {path}")
-    print(f"{sum(map(lines_of_code, paths)):5}  lines in {len(paths)} modules")
+    print(*loaded("run", "--model", str(demo.MODEL), "--skin", skin), sep="\n")
 
 
 if __name__ == "__main__":

@@ -18,6 +18,7 @@ import edge
 from edge import demo
 from edge.fake.player import play, skin_file
 from tests.conftest import ROOT, python, save_touches
+from tests.edge.test_recording import sheared
 from train.__main__ import main as train_main
 
 EXAMPLES = ROOT / "docs" / "examples"
@@ -150,11 +151,7 @@ def with_gap_and_shear(trial, is_valid, axes):
     """The trial with a taxel that is valid or not, and shear where it has three axes."""
     valid = np.ones(trial.frames.shape, dtype=bool)
     valid[3, 4, 5] = is_valid
-    if axes == 1:
-        return replace(trial, valid=valid)
-    quarter = (trial.frames // 4).astype(np.int16)
-    shear = np.stack([quarter, -quarter], axis=3)
-    return replace(trial, valid=valid, shear=shear)
+    return replace(trial if axes == 1 else sheared(trial), valid=valid)
 
 
 def require_same(trial, back):

@@ -66,10 +66,6 @@ def test_what_nothing_calls_for_is_not_loaded(core, path):
     assert path not in core
 
 
-def test_the_list_has_the_lines_of_each_module(capsys):
+def test_the_list_names_a_module_a_line(capsys):
     reading_list.main()
-    lines = capsys.readouterr().out.splitlines()
-    assert "edge/skin/bus_reader.py" in " ".join(lines)
-    count, words = lines[-1].split(maxsplit=1)
-    assert int(count) == sum(int(line.split()[0]) for line in lines[:-1])
-    assert words == f"lines in {len(lines) - 1} modules"
+    assert "edge/skin/bus_reader.py" in capsys.readouterr().out.splitlines()

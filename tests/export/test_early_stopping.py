@@ -2,7 +2,6 @@
 estimators."""
 
 import itertools
-import math
 from dataclasses import replace
 from pathlib import Path
 
@@ -22,6 +21,7 @@ from edge.touch.features import FEATURES
 from export.api import save as save_model
 from tests.conftest import PAPER, export, save_touches
 from tests.edge.model.test_engines import assert_same_bits, hostile
+from tests.hard_cases import exact
 from tests.hard_cases.models import session
 from tests.sequential import fitted_model
 from train.data.dataset import load_trials
@@ -62,11 +62,7 @@ def decided(model, recording, error):
 
 def mean_of_roots(squares, unit):
     """The mean of the whole roots of squares, in integers but for one division."""
-    wholes = []
-    for square in squares.tolist():
-        whole = round(square / unit**2)
-        root = math.isqrt(whole)
-        wholes.append(root + (4 * (whole - root * root) > 4 * root + 1))
+    wholes = [round(exact.root(round(square / unit**2))) for square in squares.tolist()]
     return sum(wholes) / len(wholes) * unit
 
 

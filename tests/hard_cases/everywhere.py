@@ -8,8 +8,7 @@ from onnx.reference import ReferenceEvaluator
 from edge.model import onnx_file
 from edge.model.graph import Graph
 from tests.hard_cases.cases import SEEDS, Case, Ladder
-from tests.hard_cases.models import converted, session, usual_pipeline
-from tests.hard_cases.neighbours import near_duplicates
+from tests.hard_cases.models import session
 from tests.hard_cases.outputs import KINDS, POINTS_S, differing, whole
 
 OPTIMISED = onnxruntime.GraphOptimizationLevel.ORT_ENABLE_ALL
@@ -50,23 +49,6 @@ def engine_error(name, kind, point, factor, seed, count=20):
     return differing(outputs, subject.outputs(vectors, point))
 
 
-def engine_usual():
-    """Nearest of near-duplicates by skl2onnx and scikit-learn, in other
-    circumstances."""
-    X, queries = near_duplicates(160, 1e-7, 0, 200)
-    pipe = usual_pipeline(X, 20, 1, np.arange(len(X)))
-    shares = []
-    for name, answer in (
-        ("skl2onnx", converted(pipe, X)),
-        ("scikit-learn", pipe.predict),
-    ):
-        alone = [answer(query[None])[0] for query in queries]
-        shares.append(f"{name} {np.mean(answer(queries) != alone):.0%}")
-    return (
-        f"nearest of near-duplicates differs alone and in a batch: {', '.join(shares)}"
-    )
-
-
 CASES = [
     Case(
         "everywhere: threads, batches, optimisation, numpy, another engine",
@@ -90,7 +72,6 @@ CASES = [
             "count",
             beside={"name": "two threads", "point": 2},
         ),
-        engine_usual,
         examples=4,
     ),
 ]

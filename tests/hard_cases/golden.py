@@ -28,6 +28,7 @@ from tests.hard_cases.neighbours import (
     offset_data,
 )
 from train.data.dataset import load_trials
+from train.data.parts import part
 from train.fitting import Fitted
 from train.model.pipeline import Choice, ContactClassifier
 
@@ -68,14 +69,10 @@ def wrapped(recording):
 
 def short(recording):
     """Let go after half the window, and touched from the first frame on."""
-    frames = recording.frames[20:].copy()
+    pressed = part(recording, slice(20, None))
+    frames = pressed.frames.copy()
     frames[60:] = 0
-    return replace(
-        recording,
-        frames=frames,
-        t=recording.t[20:],
-        joints=recording.joints[20:],
-    )
+    return replace(pressed, frames=frames)
 
 
 def hard_trials(folder):

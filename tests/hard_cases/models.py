@@ -133,14 +133,6 @@ class Ours:
         return wrong
 
 
-def usual_pipeline(X, components, k, y):
-    """PCA and k-NN as scikit-learn fits them by default, brute force."""
-    c = min(components, *X.shape)
-    return make_pipeline(
-        PCA(c, random_state=0), KNeighborsClassifier(k, algorithm="brute")
-    ).fit(X, y)
-
-
 def session(data, level=None, threads=1):
     """A session of ONNX Runtime."""
     options = onnxruntime.SessionOptions()
@@ -155,40 +147,30 @@ def session(data, level=None, threads=1):
     )
 
 
-def converted(pipe, X):
+def converted(pipe, queries):
     """The answers of the default skl2onnx conversion: float32 in, its own k-NN."""
-    proto = convert(pipe, X[:1].astype(np.float32), options={"zipmap": False})
+    vectors = queries.astype(np.float32)
+    proto = convert(pipe, vectors[:1], options={"zipmap": False})
     theirs = session(proto.SerializeToString())
-    return lambda queries: np.ravel(
-        theirs.run(None, {"X": queries.astype(np.float32)})[0]
-    )
+    return np.ravel(theirs.run(None, {"X": vectors})[0])
 
 
-def answers_of_usual(pipe, X, queries):
-    """The answers of scikit-learn and of its conversion."""
-    return {
-        "scikit-learn": pipe.predict(queries),
-        "skl2onnx": converted(pipe, X)(queries),
-    }
-
-
-def usual_neighbours(X, queries, components=6):
+def usual_neighbours(X, queries):
     """Shares of nearest rows that are not those of exact arithmetic without any
-    rounding."""
-    numbers = np.arange(len(X))
-    pipe = usual_pipeline(X, components, 1, numbers)
-    pca = pipe[0]
-    vectors = exact.unrounded(
-        np.concatenate([X, queries]),
-        pca.mean_,
-        pca.components_.T,
-    )
-    truth = [
-        exact.nearest(vectors[: len(X)], point, 1)[0][0] for point in vectors[len(X) :]
-    ]
-    answers = answers_of_usual(pipe, X, queries)
-    ours = Ours(X, choice=Choice("none", components, 1))
-    answers["ours, on its grid"] = ours.alone(queries)["neighbours"][:, 0]
+    rounding: of scikit-learn's PCA and k-NN, by brute force, and of ours."""
+    n = len(X)
+    pca = PCA(6, random_state=0)
+    pipe = make_pipeline(pca, KNeighborsClassifier(1, algorithm="brute"))
+    pipe.fit(X, np.arange(n))
+    vectors = np.concatenate([X, queries])
+    points = exact.unrounded(vectors, pca.mean_, pca.components_.T)
+    truth = [exact.nearest(points[:n], point, 1)[0][0] for point in points[n:]]
+    ours = Ours(X, choice=Choice("none", 6, 1))
+    answers = {
+        "scikit-learn": pipe.predict(queries),
+        "skl2onnx": converted(pipe, queries),
+        "ours, on its grid": ours.alone(queries)["neighbours"][:, 0],
+    }
     shares = ", ".join(
         f"{name} {np.mean(v != truth):.0%}" for name, v in answers.items()
     )

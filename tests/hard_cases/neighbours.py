@@ -9,11 +9,9 @@ from tests.hard_cases.cases import SEEDS, Case, Ladder, decades, powers_of_ten
 from tests.hard_cases.models import (
     USUAL,
     Ours,
-    answers_of_usual,
     features,
     labels_for,
     usual_neighbours,
-    usual_pipeline,
 )
 from train.model.pipeline import Choice
 from train.model.projection import FEWEST_UNITS
@@ -196,25 +194,6 @@ def grid_error(spread, seed):
     return float(errors.max() / np.linalg.norm(z, axis=1).max())
 
 
-def ties_usual():
-    """The last of 12 overlapping classes is hardly ever said where the lowest number
-    wins."""
-    X = features(160)
-    queries = features(400, 1)
-    ours = Ours(X, labels_for(X, 12), Choice("none", 6, 2))
-    graph = ours.alone(queries)
-    labels = np.array(ours.labels)
-    pipe = usual_pipeline(X, 6, 2, labels)
-    tied = (np.sort(graph["scores"], axis=1)[:, -2:] == 0.5).all(axis=1).mean()
-    shares = ", ".join(
-        f"{name} {np.mean(answer != graph['label']):.0%} not the nearest's, "
-        f"last class {np.mean(answer == 11):.1%} of answers"
-        for name, answer in answers_of_usual(pipe, X, queries).items()
-    )
-    true = f"{np.mean(labels == 11):.1%} of rows, {np.mean(graph['label'] == 11):.1%} of ours"
-    return f"{tied:.0%} of votes tie; {shares} ({true})"
-
-
 def equal_usual():
     """Equal distances are to be answered with the lower row, which the order of sums
     decides."""
@@ -322,7 +301,6 @@ CASES = [
         [{"k": k, "seed": 0} for k in (2, 4, 6)],
         {"k": st.integers(1, 20)},
         Ladder("neighbours that vote", [2, 8, 32, 160], "k"),
-        ties_usual,
     ),
     answers(
         "one row, one class, all rows the same, k as large as the training set",

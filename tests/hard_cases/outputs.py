@@ -217,21 +217,6 @@ def agreement_error(kind, point, factor, seed):
     return float(wrong)
 
 
-def contradictions():
-    """How often tasks that are decided one by one contradict each other."""
-    subject = whole(160, "contacts")
-    vectors = np.concatenate([subject.queries(seed, 1.0) for seed in range(20)])
-    answers = subject.model.run(vectors)
-    factors = subject.fitted.products_["category"]
-    pairs = list(zip(*factors.values(), strict=True))
-    named = zip(
-        *(answers[f"{factor}_label"].tolist() for factor in factors), strict=True
-    )
-    joined = np.array([pairs.index(pair) for pair in named])
-    share = float(np.mean(joined != answers["category_label"]))
-    return f"decided one by one, category contradicts its factors in {share:.0%} of answers"
-
-
 def confidence_error(kind, point, factor, seed):
     """Largest error of a confidence, over what its log odds resolve."""
     subject = whole(160, kind)
@@ -300,7 +285,6 @@ CASES = [
         HAZARDS,
         AROUND,
         FARTHER,
-        contradictions,
         examples=6,
     ),
     Case(

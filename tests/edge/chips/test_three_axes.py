@@ -4,7 +4,7 @@ that cannot be one."""
 import numpy as np
 import pytest
 
-from edge.chips.block import Block, pack
+from edge.chips.block import Block
 from edge.chips.chip import ChipSpec, WrongChip
 from edge.chips.three_axes import ZERO, ThreeAxisBlock, axes
 from edge.errors import InputError
@@ -45,11 +45,6 @@ def data():
     chip = ThreeAxisBlock(served(), 0x28, taxels=TAXELS)
     chip.read()
     return chip.frame.buffer[None]
-
-
-def test_each_taxel_is_three_signed_numbers_on_the_wire(data):
-    wire = pack(numbers().reshape(-1).astype(np.uint16), 16)
-    assert data[0, 2:-2].tobytes() == wire
 
 
 def test_the_normal_values_are_parsed_apart_from_the_shear(data):

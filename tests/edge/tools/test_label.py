@@ -162,15 +162,6 @@ def test_the_last_change_of_labels_is_taken_back(kept, edge, refused):
     assert "there is no change to take back" in refused("label", kept, "--undo")
 
 
-def test_deleted_recordings_can_be_brought_back(kept, edge):
-    before = (kept / "wrong.npz").read_bytes()
-    edge("label", kept, "--only", "wrong", "--delete", "--yes")
-    assert not (kept / "wrong.npz").exists()
-    assert len(find([str(kept)])) == 3
-    edge("label", kept, "--undo")
-    assert (kept / "wrong.npz").read_bytes() == before
-
-
 def test_a_deleted_recording_never_replaces_a_newer_one(kept, edge, refused):
     wrong = kept / "wrong.npz"
     edge("label", wrong, "--delete", "--yes")

@@ -205,7 +205,7 @@ def test_record_saves_one_trial_a_contact_and_never_overwrites(record, brief, tr
 def test_record_names_a_broken_taxel_and_leaves_it_out_of_the_trials(
     record, make_touch, tmp_path
 ):
-    touches = in_a_row(*[make_touch(seed=seed) for seed in (0, 1, 3)], rest=150)
+    touches = in_a_row(*[make_touch(seed=seed) for seed in (0, 1)], rest=60)
     flickers = 500 * (np.random.default_rng(0).random(len(touches.t)) < 0.5)
     touches.frames[:, 15, 8] += flickers.astype(np.uint16)
     save(tmp_path / "flickers.npz", touches)
@@ -214,7 +214,7 @@ def test_record_names_a_broken_taxel_and_leaves_it_out_of_the_trials(
     assert aside["taxels"] == [[15, 8]]
     files = [event["file"] for event in events if event["event"] == "saved"]
     trials = [load(file).frames for file in files]
-    assert [trial[:, 15, 8].max() for trial in trials] == [500, 0, 0]
+    assert [trial[:, 15, 8].max() for trial in trials] == [500, 0]
 
 
 def test_record_without_contact_saves_nothing(record, quiet, trials):

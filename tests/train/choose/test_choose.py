@@ -22,14 +22,15 @@ from train.model.pipeline import Choice, ContactClassifier, vote
 TWO = ("max_force", "contact_area")
 
 
-@pytest.fixture
-def settled():
-    """The function that gives a task's settings, and those chosen without each fold, of
-    two candidates: one right on other trials of known objects, the other on new
+@pytest.mark.parametrize(
+    ("grouped", "k", "by_trial"), [(False, 1, 1.0), (True, 3, 0.0)]
+)
+def test_settings_are_chosen_by_left_out_trials_or_groups_also_without_a_fold(
+    grouped, k, by_trial
+):
+    """Of two candidates: one right on other trials of known objects, the other on new
     objects."""
-    near = Choice("IV", 1, 1, "lda")
-    far = Choice("IV", 1, 3, "lda")
-    choices = {"t": [near, far]}
+    choices = {"t": [Choice("IV", 1, 1, "lda"), Choice("IV", 1, 3, "lda")]}
     folds = np.arange(12) % 3
     right = np.repeat([[True], [False]], 12, axis=1)
     trials = AnswerTable(folds, choices, {"t": np.stack([right] * 3)})
@@ -40,40 +41,14 @@ def settled():
         widths=lambda samples: (1,),
         untouched_labels=lambda t: (),
     )
-
-    def settle(grouped):
-        divisions = Divisions(folds, (), objects if grouped else None)
-        choosing = Choosing(dataset, {"t": folds.astype(str)}, (), divisions, samples=1)
-        by_trial = TrialsLeftOut(trials, {"max_force": 1})
-        by_group = GroupsLeftOut(unseen, {"max_force": 1}, groups=objects)
-        protocol = by_group if grouped else by_trial
-        chosen, without = choosing._settle("t", protocol, by_trial)
-        return {
-            "chosen": chosen.choice.k,
-            "without a fold": [choice.k for choice in without],
-            "accuracy": chosen.accuracy.accuracy,
-            "by trial": chosen.by_trial.accuracy,
-        }
-
-    return settle
-
-
-def test_settings_are_chosen_by_left_out_trials(settled):
-    assert settled(grouped=False) == {
-        "chosen": 1,
-        "without a fold": [1, 1, 1],
-        "accuracy": 1.0,
-        "by trial": 1.0,
-    }
-
-
-def test_settings_of_groups_are_chosen_by_left_out_groups_also_without_a_fold(settled):
-    assert settled(grouped=True) == {
-        "chosen": 3,
-        "without a fold": [3, 3, 3],
-        "accuracy": 1.0,
-        "by trial": 0.0,
-    }
+    divisions = Divisions(folds, (), objects if grouped else None)
+    choosing = Choosing(dataset, {"t": folds.astype(str)}, (), divisions, samples=1)
+    single = TrialsLeftOut(trials, {"max_force": 1})
+    whole = GroupsLeftOut(unseen, {"max_force": 1}, groups=objects)
+    chosen, without = choosing._settle("t", whole if grouped else single, single)
+    assert [choice.k for choice in (chosen.choice, *without)] == [k] * 4
+    assert chosen.accuracy.accuracy == 1.0
+    assert chosen.by_trial.accuracy == by_trial
 
 
 def test_among_few_trials_the_most_accurate_is_chosen_whatever_its_price():

@@ -15,6 +15,7 @@ from edge.saving import save
 from edge.touch.arm import Chain
 from edge.touch.features import feature_vector
 from tests.conftest import export, in_a_row
+from tests.edge.test_recording import sheared as with_shear
 from train.data.dataset import Measurement, load_trials
 
 
@@ -53,11 +54,8 @@ def test_several_processes_follow_the_contacts_as_one_does(recordings, folder):
 def sheared(recordings, tmp_path_factory):
     """The recordings of a skin of three axes, whose shear is part of their counts."""
     folder = tmp_path_factory.mktemp("sheared")
-    for number, path in enumerate(sorted(recordings.glob("*.npz"))):
-        touch = load(path)
-        along = (touch.frames // (2 + number % 3)).astype(np.int16)
-        shear = np.stack([along, -along // 2], axis=3)
-        save(folder / path.name, replace(touch, shear=shear))
+    for path in recordings.glob("*.npz"):
+        save(folder / path.name, with_shear(load(path)))
     return folder
 
 

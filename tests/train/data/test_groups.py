@@ -30,11 +30,8 @@ def drawn_touches(make_touch, kinds=("box", "bin", "post"), numbered=True):
     for seed, (category, kind, i) in enumerate(
         product(("hard", "soft"), kinds, (1, 2))
     ):
-        thing = (
-            f"{category} {kind} {i:02d}"
-            if numbered
-            else f"{category} {kind} {'ab'[i - 1]}"
-        )
+        number = f"{i:02d}" if numbered else "ab"[i - 1]
+        thing = f"{category} {kind} {number}"
         labels = {"category": category, "object": thing}
         touches[thing] = make_touch(kind=category, seed=seed, labels=labels)
         touches[thing].meta["simulation"] = {}

@@ -6,6 +6,7 @@ import numpy as np
 
 import train
 from edge.saving import save
+from train.data.parts import part
 from train.data.thresholds import count_contacts, proposed
 
 GIVEN = {"features": ["paper"], "decision_points_s": (), "quick": True, "jobs": 1}
@@ -48,13 +49,7 @@ def labelled(recording):
 def begun(make_touch, seed):
     """A touch whose recording begins in its middle."""
     touch = labelled(noisy(make_touch(seed=seed), seed))
-    first = len(touch.t) // 2
-    return replace(
-        touch,
-        t=touch.t[first:],
-        frames=touch.frames[first:],
-        joints=touch.joints[first:],
-    )
+    return part(touch, slice(len(touch.t) // 2, None))
 
 
 def test_recordings_that_begin_in_contact_give_no_noise_and_are_counted(make_touch):

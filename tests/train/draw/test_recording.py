@@ -2,13 +2,13 @@
 
 from dataclasses import replace
 
-import numpy as np
 import pytest
 from matplotlib.image import imread
 
 from edge import demo
 from edge.recording import load
 from edge.saving import save
+from tests.edge.test_recording import sheared
 from train.__main__ import main
 from train.draw.recording import draw
 
@@ -32,10 +32,7 @@ def test_a_label_with_dollar_signs_is_no_formula(tmp_path, beside):
 
 
 def test_shear_adds_arrows(plain, tmp_path):
-    touch = load(TOUCH)
-    quarter = (touch.frames // 4).astype(np.int16)
-    sheared = replace(touch, shear=np.stack([quarter, -quarter], axis=3))
-    draw(sheared, tmp_path / "arrows.png")
+    draw(sheared(load(TOUCH)), tmp_path / "arrows.png")
     without, arrows = (imread(path) for path in (plain, tmp_path / "arrows.png"))
     assert without.shape == arrows.shape
     white = (arrows == 1.0).all(axis=2).sum() - (without == 1.0).all(axis=2).sum()

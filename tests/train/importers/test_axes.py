@@ -6,7 +6,7 @@ from functools import partial
 import numpy as np
 import pytest
 
-import edge
+from tests.train.importers import test_csv
 from train.__main__ import main
 from train.importers.axes import lettered
 
@@ -49,14 +49,7 @@ def an_array_whose_last_axis_is_three(folder):
 @pytest.fixture
 def imported(folder):
     """The function that imports the folder with some options."""
-
-    def run(*options):
-        out = folder.parent / "out"
-        words = ["import", "csv", str(folder), "--out", str(out)]
-        assert main([*words, *options]) == 0
-        return edge.load(out / "cup_1.npz")
-
-    return run
+    return lambda *options: test_csv.imported(folder, *options)[1]["cup_1"]
 
 
 @pytest.mark.parametrize(

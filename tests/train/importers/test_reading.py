@@ -39,7 +39,7 @@ def rows_of(table):
         "sep=;\n" + PLAIN.replace(",", ";"),
         "\ufeff" + PLAIN,
         PLAIN.encode("utf-16"),
-        "# by me\n" + PLAIN,
+        "% 1.5\n\n# by me\n" + PLAIN,
         "# t,p1,p2\n0,1,2\n0.01,3,4\n",
         PLAIN.replace("\n0.01", "\n# a pause\n0.01"),
         PLAIN.replace("\n", "\n\n"),
