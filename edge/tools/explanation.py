@@ -91,8 +91,7 @@ class Space(NamedTuple):
 
     def coordinates(self, differences: Floats) -> Floats:
         """(c,) coordinates of scaled differences."""
-        z = np.clip(differences, -self.reach, self.reach) @ self.weights
-        return np.clip(z, -self.limit, self.limit)
+        return np.clip(differences @ self.weights, -self.limit, self.limit)
 
 
 class Near(NamedTuple):
