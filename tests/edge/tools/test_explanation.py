@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from edge.model.model import Model
-from edge.tools.explanation import Explanation, Near, Space, explain
+from edge.tools.explain import Explanation, Near, Space, explain
 from tests.sequential import fitted_model
 from train.model.pipeline import Choice
 
