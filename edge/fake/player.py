@@ -15,8 +15,7 @@ from edge.bus.protocol import Message
 from edge.chips import kinds
 from edge.chips.chip import MOST_TAXELS, UNUSED, ChipSpec
 from edge.errors import InputError
-from edge.fake.bus import FakeBus, FakeTCA9548A, wire_bits
-from edge.fake.chip import FakeChip, Sense
+from edge.fake.bus import FakeBus, FakeChip, FakeTCA9548A, Sense, wire_bits
 from edge.fake.clock import TIME_ROUNDING_S, PacedClock, VirtualClock
 from edge.interrupt import delayed
 from edge.recording import Recording, load
