@@ -9,10 +9,9 @@ from functools import partial
 from typing import NamedTuple
 
 from edge.bus.protocol import Transfer, bus_error, write
-from edge.fake.bus import NACK_BITS, FakeBus
+from edge.fake.bus import NACK_BITS, FakeBus, FakeTCA9548A
 from edge.fake.clock import VirtualClock
 from edge.fake.player import calibrated, fake_buses
-from edge.fake.tca9548a import FakeTCA9548A
 from edge.skin.skin import Skin
 from edge.skin.wiring import BusSpec
 

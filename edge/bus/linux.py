@@ -3,9 +3,7 @@
 import ctypes
 import errno
 import math
-import os
 import time
-from contextlib import suppress
 from fcntl import LOCK_EX, LOCK_NB, flock, ioctl
 from pathlib import Path
 from typing import Any
@@ -21,17 +19,6 @@ I2C_RDWR = 0x0707
 ADAPTERS = Path("/sys/class/i2c-dev")
 """A folder for each adapter, named as its device, with the adapter's name in the file
 `name`."""
-
-
-def lock_holder(fd: int) -> str:
-    """Name and number of the process that holds the lock of an open file."""
-    with suppress(OSError, IndexError):
-        inode = str(os.fstat(fd).st_ino)
-        for line in Path("/proc/locks").read_text().splitlines():
-            fields = line.split()
-            if fields[1] == "FLOCK" and fields[5].split(":")[-1] == inode:
-                return f"{Path('/proc', fields[4], 'comm').read_text().strip()} ({fields[4]})"
-    return "another program"
 
 
 def find_device(name: str, adapters: Path = ADAPTERS) -> str:
@@ -117,7 +104,7 @@ class LinuxBus:
                 max(1, math.ceil(self.timeout_s * 100.0 - 1e-9)),
             )
         except BlockingIOError:
-            remedy = f"{lock_holder(smbus.fd)} is using the bus; end it first"
+            remedy = "another program is using the bus; end it first"
             smbus.close()
             raise bus_error(errno.EBUSY, self.name, remedy=remedy) from None
         except OSError as error:

@@ -1,7 +1,7 @@
 """A kind of chip: its driver, and its place in the wiring of a skin.
 
 To add a chip, write a module with a driver (a `Chip`) and one with its model for the
-fake bus (`edge.fake.chip.FakeChip`), and enter both in the list of `edge.chips.kinds`.
+fake bus (`edge.fake.bus.FakeChip`), and enter both in the list of `edge.chips.kinds`.
 """
 
 from __future__ import annotations

@@ -13,7 +13,7 @@ class Kind:
 
     Attributes:
         driver: path of the driver, a `edge.chips.chip.Chip`.
-        model: path of its model for the fake bus, a `edge.fake.chip.FakeChip`.
+        model: path of its model for the fake bus, a `edge.fake.bus.FakeChip`.
     """
 
     driver: str

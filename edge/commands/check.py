@@ -10,7 +10,6 @@ versions, clock, load and disk, with a remedy for each shortcoming.
 import argparse
 from collections.abc import Iterator
 from dataclasses import asdict
-from importlib.util import find_spec
 
 from edge.commands.options import within
 from edge.commands.output import Output, counted
@@ -83,8 +82,6 @@ def remarks(file: SkinFile) -> Iterator[str]:
     if uncovered:
         yield f"taxels without a chip, which are never valid: {uncovered}"
     yield from _remarks_of_muxes(file)
-    if any(bus.serial for bus in file.buses) and find_spec("serial") is None:
-        yield "pyserial is not installed: run `pip install pyserial`"
     if file.calibration is None:
         yield f"not calibrated yet: run `edge-classify calibrate --skin {file.path}`"
         return
@@ -141,7 +138,9 @@ def run(arguments: argparse.Namespace) -> int:
             "Hz: use more buses, a faster clock_hz or baud, or a lower [read] rate_hz"
         )
     buses = []
-    lines = [heading(arguments.skin, file)]
+    rows, cols = file.layout.shape
+    chips = counted(len(file.chips), "chip")
+    lines = [f"{arguments.skin}: {file.name}, {rows} x {cols} taxels on {chips}"]
     for bus, bits in zip(file.buses, frame_bits, strict=True):
         entry = {"device": bus.device, "chips": len(bus.chips)}
         buses.append({**entry, "clock_hz": bus.clock_hz, "bits": bits})
@@ -160,7 +159,7 @@ def run(arguments: argparse.Namespace) -> int:
     event = {
         "event": "check",
         "skin": file.name,
-        "taxels": file.layout.rows * file.layout.cols,
+        "taxels": rows * cols,
         "chips": len(file.chips),
         "buses": buses,
         "frame_rate_hz": round(rate_hz, 1),
@@ -170,13 +169,6 @@ def run(arguments: argparse.Namespace) -> int:
     }
     output.event(event, "\n".join(lines))
     return 1 if wrong else 0
-
-
-def heading(path: str, file: SkinFile) -> str:
-    """The first line: the skin and its chips."""
-    rows, cols = file.layout.shape
-    chips = counted(len(file.chips), "chip")
-    return f"{path}: {file.name}, {rows} x {cols} taxels on {chips}"
 
 
 def wires(file: SkinFile, overhead_us: float) -> tuple[list[float], float]:

@@ -1,10 +1,10 @@
 """Put a new model in the place of the one that the robot runs, or take it back.
 
-Verifies the model with its golden file in every engine that is installed, and against
-the skin file if one is given. The model that ran is kept as the former one beside the
-new one, which takes its place in one step; --back exchanges the two. A golden file has
-its model's version in its name. With --service, the service is restarted, and the
-former model comes back by itself if the service has not run for a minute.
+Verifies the model with its golden file, and against the skin file if one is given. The
+model that ran is kept as the former one beside the new one, which takes its place in
+one step; --back exchanges the two. A golden file has its model's version in its name.
+With --service, the service is restarted, and the former model comes back by itself if
+the service has not run for a minute.
 """
 
 import argparse

@@ -64,14 +64,6 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         metavar="WHY",
         help="which touches are kept: unsure, unknown, unusual, all (default: %(default)s)",
     )
-    parser.add_argument(
-        "--keep-mb",
-        type=within(float, 1.0, 1e6),
-        default=200.0,
-        metavar="MB",
-        help="most megabytes of kept touches; the oldest without a label go first "
-        "(default: %(default)g)",
-    )
 
 
 def end_event(schedule: Schedule, frames: int, lost: int) -> dict[str, Any]:
@@ -151,7 +143,7 @@ def _listeners(
             from edge.tools.keep import Keeper, reasons  # few runs keep touches
 
             why = reasons(arguments.keep_if)
-            keeper = Keeper(arguments.keep, why, arguments.keep_mb, opened, model.info)
+            keeper = Keeper(arguments.keep, why, opened, model.info)
             listeners.append(stack.enter_context(closing(keeper)).push)
         if "NOTIFY_SOCKET" in os.environ:
             from edge.output.systemd import Notifier  # only a service has a manager

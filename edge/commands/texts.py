@@ -7,20 +7,8 @@ from typing import Any
 
 from edge.events import MOST_PLACES, json_line
 
-BAR = 10
-"""Width in characters of a bar that shows a share."""
 LONGEST_LINE = 80
 Line = Mapping[str, Any]
-
-
-def bar(share: float) -> str:
-    """A bar that shows a share from 0 to 1.
-
-    >>> bar(0.72)
-    '███████···'
-    """
-    full = round(min(max(share, 0.0), 1.0) * BAR)
-    return "█" * full + "·" * (BAR - full)
 
 
 def wrapped(text: str, indent: str = "") -> list[str]:
@@ -83,7 +71,7 @@ def _decision(line: Line) -> str:
     contact = number and f"{number}:"
     text = f"{time:8.3f} s {contact} {line['task']:<10} {label:<16}"
     if line["confidence"]:
-        text += f" {bar(line['confidence'])} {line['confidence']:4.0%}"
+        text += f" {line['confidence']:4.0%}"
     return f"{text}  ({'; '.join(notes)})" if notes else text
 
 

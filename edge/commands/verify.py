@@ -6,7 +6,7 @@ The exit status is 1 if a result differs.
 """
 
 import argparse
-from typing import Any
+from dataclasses import asdict
 
 from edge.commands.options import add_engine
 from edge.commands.output import LOG, Output
@@ -32,28 +32,14 @@ def run(arguments: argparse.Namespace) -> int:
     checks = verify(model, arguments.golden or golden_of(model.path, model.version))
     width = max(len(check.name) for check in checks)
     for check in checks:
-        output.event(_event(check), _text(check, width))
+        event = {"event": "check", **asdict(check), "passed": check.passed}
+        output.event(event, _text(check, width))
     failed = [check.name for check in checks if not check.passed]
     if failed:
         LOG.error(f"results that differ from the golden file: {', '.join(failed)}")
     else:
         output.text(f"all {len(checks)} results agree with the golden file")
     return 1 if failed else 0
-
-
-def _event(check: Check) -> dict[str, Any]:
-    """The line of a check for programs."""
-    event: dict[str, Any] = {
-        "event": "check",
-        "name": check.name,
-        "rows": check.rows,
-        "passed": check.passed,
-    }
-    if check.row is not None:
-        event["row"] = check.row
-        event["seen"] = check.seen
-        event["expected"] = check.expected
-    return event
 
 
 def _text(check: Check, width: int) -> str:

@@ -18,7 +18,7 @@ from edge.chips.ad7147 import (
     SYSTEM,
 )
 from edge.chips.chip import ChipSpec
-from edge.fake.chip import FakeChip, Sense
+from edge.fake.bus import FakeChip, Sense
 
 
 class FakeAD7147(FakeChip):

@@ -9,7 +9,7 @@ from edge.bus.crc import sealed
 from edge.chips.block import FRAME, IDENTITY, THREE_AXES, identity, pack
 from edge.chips.chip import ChipSpec
 from edge.chips.three_axes import AXES, ZERO, ThreeAxisBlock
-from edge.fake.chip import FakeChip, Sense
+from edge.fake.bus import FakeChip, Sense
 from edge.fake.clock import TIME_ROUNDING_S
 
 RATE_HZ = 100.0

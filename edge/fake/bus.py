@@ -2,25 +2,106 @@
 refuse."""
 
 import errno
+import random
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
+from typing import Self
 
 import numpy as np
 
+from edge.arrays import Counts
 from edge.bus.protocol import Message, Transfer, bus_error
-from edge.fake.chip import FakeChip
+from edge.bus.tca9548a import CHANNELS
+from edge.chips.chip import ChipSpec
 from edge.fake.clock import Hand, VirtualClock
-from edge.fake.tca9548a import FakeTCA9548A
 
 NACK_BITS = 11
 """START, the address that nobody acknowledges, and STOP."""
 
 
+Sense = Callable[[float], Counts]
+"""Raw values (taxels,) that a fake chip senses at a time in seconds."""
+
+
+class FakeChip(ABC):
+    """A model of a chip on a fake bus."""
+
+    def __init__(self, sense: Sense) -> None:
+        """Model a chip that has just been powered on.
+
+        Args:
+            sense: raw values of its taxels at a time.
+        """
+        self._sense = sense
+        self._pointer = 0
+        self.reset()
+
+    @classmethod
+    def of(
+        cls,
+        spec: ChipSpec,
+        sense: Sense,
+        *,
+        timed: bool,
+        power_up: random.Random,
+    ) -> Self:
+        """The model of a skin's chip.
+
+        Args:
+            spec: the chip.
+            sense: raw values of its taxels at a time.
+            timed: whether conversions take their real time.
+            power_up: draws the registers that power-up leaves undefined.
+        """
+        return cls(sense)
+
+    @abstractmethod
+    def write(self, data: bytes, t: float) -> None:
+        """Take the bytes of one write message at time `t`."""
+
+    @abstractmethod
+    def read(self, n: int, t: float) -> bytes:
+        """Serve the `n` bytes of one read message at time `t`."""
+
+    @abstractmethod
+    def reset(self) -> None:
+        """Lose all settings, as in a brown-out."""
+
+
+class FakeTCA9548A(FakeChip):
+    """A model of the TCA9548A: the channels written connect at STOP."""
+
+    def __init__(self) -> None:
+        self.channels: list[dict[int, FakeChip]] = [{} for _ in range(CHANNELS)]
+        """Chips by address on each channel."""
+        self.reset()
+
+    def reset(self) -> None:
+        """Disconnect all channels."""
+        self._control = 0
+        self.stop()
+
+    def write(self, data: bytes, t: float) -> None:
+        """The last byte written is the control byte."""
+        if data:
+            self._control = data[-1]
+
+    def read(self, n: int, t: float) -> bytes:
+        """The control byte, repeated."""
+        return bytes([self._control]) * n
+
+    def stop(self) -> None:
+        """Connect the channels written."""
+        self.connected = [n for n in range(CHANNELS) if self._control >> n & 1]
+
+
 def wire_bits(messages: Sequence[Message]) -> int:
     """Bits on the wire: 9 a byte, 1 each for START, repeated START and STOP.
 
-    >>> from edge.bus.protocol import read, write
-    >>> wire_bits([write(0x2C, [0x00, 0x0B]), read(0x2C, 24)])
-    255
+        >>> from edge.bus.tca9548a import CHANNELS
+    from edge.bus.protocol import read, write
+        >>> wire_bits([write(0x2C, [0x00, 0x0B]), read(0x2C, 24)])
+        255
     """
     return 1 + sum(1 + 9 * (1 + len(m.buffer)) for m in messages)
 
@@ -28,14 +109,15 @@ def wire_bits(messages: Sequence[Message]) -> int:
 class FakeBus:
     """A bus with chips and muxes.
 
-    It refuses the shapes that some real adapter refuses: a read anywhere but last
-    (EOPNOTSUPP, Raspberry Pi up to 4), or a second address in one call (EINVAL, Pi 5).
+        It refuses the shapes that some real adapter refuses: a read anywhere but last
+        (EOPNOTSUPP, Raspberry Pi up to 4), or a second address in one call (EINVAL, Pi 5).
 
-    >>> from edge.bus.protocol import fetch, send
-    >>> bus = FakeBus(chips={0x70: FakeTCA9548A()})
-    >>> send(bus, 0x70, [4])
-    >>> fetch(bus, 0x70, b"", 1)
-    b'\\x04'
+        >>> from edge.bus.tca9548a import CHANNELS
+    from edge.bus.protocol import fetch, send
+        >>> bus = FakeBus(chips={0x70: FakeTCA9548A()})
+        >>> send(bus, 0x70, [4])
+        >>> fetch(bus, 0x70, b"", 1)
+        b'\\x04'
     """
 
     def __init__(

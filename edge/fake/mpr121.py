@@ -14,7 +14,7 @@ from edge.chips.mpr121 import (
     SATURATED,
     TOUCH_HIGH,
 )
-from edge.fake.chip import FakeChip
+from edge.fake.bus import FakeChip
 
 
 class FakeMPR121(FakeChip):

@@ -15,10 +15,8 @@ from edge.bus.protocol import Message
 from edge.chips import kinds
 from edge.chips.chip import MOST_TAXELS, UNUSED, ChipSpec
 from edge.errors import InputError
-from edge.fake.bus import FakeBus, wire_bits
-from edge.fake.chip import FakeChip, Sense
+from edge.fake.bus import FakeBus, FakeChip, FakeTCA9548A, Sense, wire_bits
 from edge.fake.clock import TIME_ROUNDING_S, PacedClock, VirtualClock
-from edge.fake.tca9548a import FakeTCA9548A
 from edge.interrupt import delayed
 from edge.recording import Recording, load
 from edge.skin import file as skinfile
@@ -241,21 +239,6 @@ def still(file: SkinFile) -> Skin:
     return fake_skin(file, lambda t: silence)
 
 
-def playback(file: SkinFile, recording: Recording, *, loop: bool = False) -> Playback:
-    """A recording as a scene for a skin.
-
-    Raises:
-        InputError: the recording's shape is not the skin's.
-    """
-    if recording.frames.shape[1:] != file.layout.shape:
-        rows, cols = recording.frames.shape[1:]
-        raise InputError(
-            f"the recording has {rows} x {cols} taxels, the skin {file.name!r} "
-            f"{file.layout.rows} x {file.layout.cols}; name its own skin file"
-        )
-    return Playback(recording, loop=loop)
-
-
 def play(
     file: SkinFile,
     recording: Recording,
@@ -268,7 +251,13 @@ def play(
     Raises:
         InputError: the recording's shape is not the skin's.
     """
-    scene = playback(file, recording, loop=loop)
+    if recording.frames.shape[1:] != file.layout.shape:
+        rows, cols = recording.frames.shape[1:]
+        raise InputError(
+            f"the recording has {rows} x {cols} taxels, the skin {file.name!r} "
+            f"{file.layout.rows} x {file.layout.cols}; name its own skin file"
+        )
+    scene = Playback(recording, loop=loop)
     skin = fake_skin(file, scene, **options)
     scene.start = skin.clock.now()
     return skin, scene

@@ -24,7 +24,7 @@ other distances.
 
 import os
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import chain, pairwise, starmap
 from pathlib import Path
 from typing import Any
@@ -113,28 +113,7 @@ def verify(model: Model, path: str | os.PathLike[str]) -> list[Check]:
     ):
         SkinLayout.from_dict(meta["skin"], where=name)
         lines = chain(_path(model, arrays, meta), _graph(model, name, arrays))
-        checks = list(starmap(compared, lines))
-    second = second_opinion(model, arrays)
-    return checks if second is None else [*checks, second]
-
-
-def second_opinion(model: Model, arrays: Mapping[str, Array]) -> Check | None:
-    """Compare the model's engine with the graph in numpy, to the last bit.
-
-    Returns:
-        The first output that differs; None where numpy is the model's engine.
-    """
-    if model.engine == "numpy":
-        return None
-    name = "the same in numpy"
-    rows = len(arrays["vectors"])
-    in_numpy = answers(Model(model.path, "numpy"), arrays)
-    for key, answer in answers(model, arrays).items():
-        answered = arrays[_answered_key(key)] >= 0
-        check = compared(key, answer[answered], in_numpy[key][answered])
-        if not check.passed:
-            return replace(check, name=f"{name}: {key}", rows=rows)
-    return Check(name, rows)
+        return list(starmap(compared, lines))
 
 
 def _answered_key(key: str) -> str:

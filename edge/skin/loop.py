@@ -11,8 +11,7 @@ from types import FrameType
 from typing import Any, Protocol
 
 from edge.arrays import Floats
-from edge.clock import Clock
-from edge.skin.skin import Skin
+from edge.skin.skin import Clock, Skin
 from edge.touch.frame import Frame
 
 STOP_S = 0.05

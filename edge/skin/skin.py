@@ -2,18 +2,18 @@
 
 import math
 import os
+import time
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack, closing
 from dataclasses import dataclass
-from typing import Self
+from typing import Protocol, Self
 
 import numpy as np
 
 from edge.arrays import Booleans, Counts
 from edge.bus.protocol import Adapter
 from edge.chips.chip import ChipSpec
-from edge.clock import Clock, SystemClock
 from edge.errors import EdgeError, InputError
 from edge.skin.bus_reader import LONGEST_STEP_S, OLDEST_FRAMES, BusReader, State
 from edge.skin.decoder import Baseline, Decoder
@@ -24,6 +24,37 @@ from edge.touch.frame import Frame
 SILENT_FRAMES = 50
 """A taxel without a valid value in this many frames in a row is silent: half a second
 at 100 Hz, within which a taxel returns from any fault that has ended."""
+
+
+class Clock(Protocol):
+    """Seconds that never go back; a fake skin may have a virtual clock
+    (`edge.fake.clock`)."""
+
+    def now(self) -> float:
+        """Seconds since some fixed moment."""
+
+    def real(self) -> float:
+        """Real time on this clock's scale: when another program's line arrives."""
+
+    def sleep_until(self, t: float) -> None:
+        """Wait until `t`; return at once if it has passed."""
+
+
+class SystemClock:
+    """The kernel's monotonic clock.
+
+    >>> clock = SystemClock()
+    >>> clock.sleep_until(clock.now() + 0.001)
+    """
+
+    now = staticmethod(time.monotonic)
+    real = staticmethod(time.monotonic)
+
+    def sleep_until(self, t: float) -> None:
+        """Wait until `t`; return at once if it has passed."""
+        remaining_s = t - time.monotonic()
+        if remaining_s > 0.0:
+            time.sleep(remaining_s)
 
 
 @dataclass(frozen=True)

@@ -65,11 +65,6 @@ def run(arguments: argparse.Namespace) -> int:
         output.text(
             f"{name:<10} {stage['median_us']:>9} us median {stage['p99_us']:>9} us p99"
         )
-    output.text(
-        f"model      {board['model']['bytes'] / 1e6:>9.3f} MB\n"
-        f"memory     {board['memory_mb']:>9.1f} MB\n"
-        f"cold start {board['cold_start_ms']:>9.1f} ms (fastest of {REPEATS})"
-    )
     output.event(
         {"event": "bench", "file": arguments.out}, f"written to {arguments.out}"
     )
@@ -92,7 +87,6 @@ def measure(model: Model) -> dict[str, Any]:
             "name": platform.node(),
             "kind": kind(),
             "cores": os.cpu_count(),
-            "system": platform.platform(),
             "edge-classify": __version__,
         },
         "model": {

@@ -24,6 +24,8 @@ from edge.writing import check_writable
 REASONS = ("unsure", "unknown", "unusual", "all")
 LONGEST_S = 10.0
 """Seconds from onset that are kept of a touch."""
+MOST_BYTES = 200_000_000
+"""Bytes that the kept files may take together."""
 WAITING = 4
 """Touches that may wait to be written; of more the oldest is lost."""
 STEM = "kept-n"
@@ -48,7 +50,6 @@ class Keeper:
         self,
         folder: Path,
         reasons: Sequence[str],
-        megabytes: float,
         opened: Opened,
         info: ModelInfo,
     ) -> None:
@@ -57,7 +58,6 @@ class Keeper:
         Args:
             folder: for the recordings; made where it is missing.
             reasons: some of `REASONS`.
-            megabytes: most that the kept files may take together.
             opened: the skin whose frames are pushed.
             info: of the model that decides.
 
@@ -69,7 +69,6 @@ class Keeper:
         self.lost = 0
         self._folder = folder
         self._reasons = frozenset(reasons)
-        self._most_bytes = 1e6 * megabytes
         self._window_s = info.window_s
         self._meta = shared_meta(opened, info.chain)
         if info.chain is not None:
@@ -147,7 +146,8 @@ class Keeper:
         if not path.exists():
             LOG.warning(
                 f"{self._folder}: touches are no longer kept, as labelled ones fill the "
-                "limit of --keep-mb; move them to another folder, or raise it"
+                f"{MOST_BYTES // 1_000_000} MB that kept ones may take; move them to another "
+                "folder"
             )
 
     def _make_room(self) -> None:
@@ -157,7 +157,7 @@ class Keeper:
         for file in sorted(self._folder.glob("kept-*.npz")):
             with suppress(OSError):  # another program may be quicker
                 sizes[file] = file.stat().st_size
-        excess = sum(sizes.values()) - self._most_bytes
+        excess = sum(sizes.values()) - MOST_BYTES
         if excess <= 0:
             return
         # Who changes labels here keeps all; the next touch makes room.

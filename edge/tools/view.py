@@ -1,29 +1,53 @@
 """Show the skin live in a terminal or on a web page.
 
-Draws the skin and, with --model, the events of the last contact. Taxels in contact are red to
-white by force, those below the contact threshold grey, and those that cannot be read
-blue. Each line shows two rows of taxels, with row 0 at the top. Ctrl-C quits. With
+Draws the skin and, with --model, the events of the last contact. Taxels in contact are
+red to white by force, those below the contact threshold grey, and those that cannot be
+read blue. Each line shows two rows of taxels, with row 0 at the top. Ctrl-C quits. With
 --web, a page for a browser shows the same, with the features of each contact over time.
 """
 
 import argparse
+import math
 import shutil
 import sys
 import textwrap
 from collections import deque
-from collections.abc import Iterable
-from contextlib import nullcontext
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager, nullcontext
+from itertools import groupby
 
+import numpy as np
+
+from edge.arrays import Bytes, Floats
 from edge.classifier import Classifier
 from edge.commands.options import add_reading
+from edge.commands.output import counted
 from edge.commands.source import reading
 from edge.commands.texts import event_text
 from edge.events import Event, Onset
 from edge.model.model import Model
-from edge.tools import terminal
+from edge.touch.active import Region
 from edge.touch.frame import Frame
 from edge.touch.layout import SkinLayout
+from edge.touch.region import find_regions
 
+Colours = Bytes
+"""Numbers in the 256-colour palette."""
+CLEAR = "\x1b[2J"
+HOME = "\x1b[H"
+HIDE = "\x1b[?25l"
+SHOW = "\x1b[?25h"
+PLAIN = "\x1b[0m"
+REST = tuple(range(233, 242))
+"""256-colour greys by force, for taxels outside every region."""
+TOUCH = (88, 124, 160, 196, 202, 208, 214, 220, 226, 228, 231)
+"""Dark red to white by force, for the taxels of a region."""
+LOST = 18
+"""Dark blue, for a taxel that cannot be read."""
+LEGEND = (
+    "red to white: in contact, by force; grey: below the threshold; blue: cannot be "
+    "read; Ctrl-C quits"
+)
 RATE_HZ = 10.0
 """Pictures per second."""
 FULL_NEWTONS = 17.0
@@ -40,18 +64,107 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     add_reading(parser, " (in place of the terminal)")
 
 
+def skin_colours(
+    frame: Frame,
+    layout: SkinLayout,
+    full: int,
+) -> tuple[Colours, list[Region]]:
+    """256-colour numbers (rows, cols), and the regions.
+
+    The colours show force on a logarithmic scale up to `full` counts.
+    """
+    threshold = layout.threshold_counts
+    regions = find_regions(
+        frame.counts,
+        threshold,
+        valid=frame.valid,
+        wraps=layout.wraps,
+    )
+    counts = frame.counts.astype(np.float64)
+    floor = max(threshold, 1)
+    colours = _shades(REST, np.log1p(np.minimum(counts, threshold)) / math.log1p(floor))
+    span = math.log(max(full, threshold + 2) / floor)
+    touched = _shades(TOUCH, np.log(np.maximum(counts, 1.0) / floor) / span)
+    for region in regions:
+        colours[region.mask] = touched[region.mask]
+    if frame.valid is not None:
+        colours[~frame.valid] = LOST
+    return colours, regions
+
+
+def _shades(palette: Sequence[int], share: Floats) -> Colours:
+    """A palette's colour for each share from 0 to 1; others get the colour of the
+    nearer end."""
+    steps = np.clip(share, 0.0, 1.0) * (len(palette) - 1)
+    shades: Colours = np.array(palette, dtype=np.uint8)[steps.astype(int)]
+    return shades
+
+
+def picture(colour: Colours, *, wide: int = 2) -> str:
+    """Lines of half-blocks, with an escape sequence wherever the colour changes.
+
+    Args:
+        colour: (rows, cols) numbers in the 256-colour palette.
+        wide: characters per taxel.
+    """
+    lines = []
+    for top in range(0, len(colour), 2):
+        line = ""
+        cells = zip(*colour[top : top + 2].tolist(), strict=True)
+        for (upper, *lower), taxels in groupby(cells):
+            background = f"48;5;{lower[0]}" if lower else "49"
+            blocks = "▀" * wide * len(list(taxels))
+            line += f"\x1b[38;5;{upper};{background}m{blocks}"
+        lines.append(line + PLAIN)
+    return "\n".join(lines)
+
+
+def caption(frame: Frame, regions: Sequence[Region], layout: SkinLayout) -> str:
+    """One line about the largest region and the taxels that cannot be read."""
+    items = [f"{frame.t:9.2f} s"]
+    for region in regions[:1]:
+        scale = layout.counts_per_newton
+        force = (
+            f"{region.peak} counts" if scale is None else f"{region.peak / scale:.2f} N"
+        )
+        row, col = region.centroid
+        taxels = counted(region.area, "taxel")
+        items.append(f"{force} on {taxels} at row {row:.1f}, column {col:.1f}")
+    if len(regions) != 1:
+        items.append(f"{len(regions) - 1} more" if regions else "no contact")
+    if frame.valid is not None and not frame.valid.all():
+        items.append(
+            f"{int((~frame.valid).sum())} of {frame.valid.size} taxels cannot be read"
+        )
+    return "  |  ".join(items)
+
+
+def screen(text: str) -> str:
+    """A text from the upper left corner on; each line clears the rest of its row."""
+    return HOME + "".join(f"{line}\x1b[K\n" for line in text.split("\n"))
+
+
+@contextmanager
+def drawing() -> Iterator[None]:
+    """Within the block, the terminal is clear for pictures and its cursor is hidden."""
+    print(HIDE + CLEAR, end="")
+    try:
+        yield
+    finally:
+        print(PLAIN + SHOW, end="", flush=True)
+
+
 def draw(frame: Frame, layout: SkinLayout, events: Iterable[str]) -> str:
     """One picture: the skin, its caption, the texts of events and the legend."""
     full = FULL_FACTOR * max(layout.threshold_counts, 1)
     if layout.counts_per_newton is not None:
         full = round(FULL_NEWTONS * layout.counts_per_newton)
-    colour, regions = terminal.skin_colours(frame, layout, full)
+    colour, regions = skin_colours(frame, layout, full)
     columns = shutil.get_terminal_size().columns
     wide = 2 if 2 * layout.cols <= columns else 1
-    texts = [terminal.caption(frame, regions, layout), *events, terminal.LEGEND]
+    texts = [caption(frame, regions, layout), *events, LEGEND]
     lines = [line for text in texts for line in textwrap.wrap(text, columns)]
-    picture = terminal.picture(colour[:, :columns], wide=wide)
-    return "\n".join([picture, *lines])
+    return "\n".join([picture(colour[:, :columns], wide=wide), *lines])
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -66,7 +179,7 @@ def run(arguments: argparse.Namespace) -> int:
             real_time=sys.stdout.isatty(),
             decides=model is not None,
         ) as live,
-        terminal.drawing() if live.page is None else nullcontext(),
+        drawing() if live.page is None else nullcontext(),
     ):
         classifier = None if model is None else Classifier(model, live.skin.layout)
         layout = live.skin.layout if classifier is None else classifier.layout
@@ -78,7 +191,7 @@ def run(arguments: argparse.Namespace) -> int:
             if live.page is None and frame.t >= due:
                 due = frame.t + interval_s
                 print(
-                    terminal.screen(draw(frame, layout, texts)),
+                    screen(draw(frame, layout, texts)),
                     end="",
                     flush=True,
                 )

@@ -17,7 +17,7 @@ import numpy as np
 from edge.cli import main as edge_main
 from edge.errors import InputError
 from edge.model.model import Model
-from edge.tools.explanation import Space
+from edge.tools.explain import Space
 from edge.touch.arm import Chain
 from tests.edge.touch.test_urdf import ARM
 from tests.fuzz import mutate

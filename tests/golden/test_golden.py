@@ -20,8 +20,8 @@ def checks():
 
 def test_every_quantity_of_the_path_and_of_the_graph_is_met(checks):
     assert [c.name for c in checks.values() if not c.passed] == []
-    # The last two belong to no task: out_of_range, and the same in numpy.
-    assert len(checks) == 4 + 3 * 4 + 2
+    # The last one, out_of_range, belongs to no task.
+    assert len(checks) == 4 + 3 * 4 + 1
 
 
 def test_whole_numbers_are_bit_identical_on_every_vector(checks):

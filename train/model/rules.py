@@ -33,9 +33,8 @@ from scipy.special import expit
 from scipy.stats import beta
 
 from edge.arrays import Booleans, Floats, Integers
-from edge.early import is_fixed
+from edge.early import TEST_SHARE, is_fixed
 from edge.model.info import StoppingRule
-from edge.model.refusal import TEST_SHARE
 
 RISK = 0.1
 """Probability that a certificate is wrong."""

@@ -13,7 +13,7 @@ from sklearn.metrics import precision_recall_fscore_support
 
 from edge.arrays import Integers
 from edge.model.model import Model
-from edge.tools.explanation import Explanation, Space, explain
+from edge.tools.explain import Explanation, Space, explain
 from edge.tools.info import doubt
 from train.choose.evaluate import Result
 from train.data.folds import finest, stratified_folds

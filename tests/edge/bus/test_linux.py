@@ -1,8 +1,6 @@
 """Errors by name, bits on the wire, and the sentence for a bus that is missing."""
 
 import errno
-import fcntl
-import os
 import re
 
 import numpy as np
@@ -93,14 +91,6 @@ def test_a_device_that_is_missing_or_no_bus_is_named(tmp_path):
 def test_a_read_takes_only_a_buffer_that_the_kernel_can_write(into):
     with pytest.raises(ValueError, match="contiguous uint8"):
         read(0x2C, into)
-
-
-def test_the_process_that_holds_a_lock_is_named(tmp_path):
-    path = tmp_path / "i2c"
-    with path.open("w") as locked, path.open("w") as blocked:
-        assert linux.lock_holder(blocked.fileno()) == "another program"
-        fcntl.flock(locked, fcntl.LOCK_EX)
-        assert linux.lock_holder(blocked.fileno()).endswith(f" ({os.getpid()})")
 
 
 @pytest.fixture

@@ -10,7 +10,7 @@ from edge.bus.protocol import BusFault, write
 from edge.bus.tca9548a import LEAVE_ATTEMPTS, TCA9548A
 from edge.chips.ad7147 import AD7147
 from edge.fake.ad7147 import FakeAD7147
-from edge.fake.tca9548a import FakeTCA9548A
+from edge.fake.bus import FakeTCA9548A
 from tests.edge.chips.chips import parsed
 from tests.faulty import Fault, FaultyBus
 

@@ -12,7 +12,7 @@ from edge.chips import kinds
 from edge.chips.chip import Chip, Defaults, Option, Traits
 from edge.chips.kinds import KINDS, Kind
 from edge.errors import InputError
-from edge.fake.chip import FakeChip
+from edge.fake.bus import FakeChip
 from edge.skin import file as skinfile
 from edge.skin.file import Signal, parse
 from tests.edge.skin.small import mpr121

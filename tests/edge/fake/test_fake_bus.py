@@ -6,8 +6,7 @@ import errno
 import pytest
 
 from edge.bus.protocol import BusError, BusGone, BusRefused, fetch, read, send, write
-from edge.fake.chip import FakeChip
-from edge.fake.tca9548a import FakeTCA9548A
+from edge.fake.bus import FakeChip, FakeTCA9548A
 from tests.faulty import Fault, FaultyBus
 
 

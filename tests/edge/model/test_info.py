@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from edge.config import ConfigTable
-from edge.early import fastest, is_fixed, is_sure, stopping_rules
+from edge.early import fastest, is_fixed, is_sure, refusal, stopping_rules
 from edge.errors import InputError
 from edge.model.info import (
     Remoteness,
@@ -17,7 +17,6 @@ from edge.model.info import (
     margin,
 )
 from edge.model.metadata_reader import read_remoteness, read_stopping
-from edge.model.refusal import refusal
 from edge.model.unusual import unusual
 
 

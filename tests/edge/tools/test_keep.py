@@ -8,6 +8,7 @@ from edge.errors import InputError
 from edge.events import Decided
 from edge.recording import Recording, load
 from edge.saving import save
+from edge.tools import keep
 from edge.tools.keep import reasons, reasons_of
 from tests.conftest import decided
 
@@ -65,12 +66,18 @@ def test_what_is_sure_is_not_kept(edge, tmp_path):
     assert list(tmp_path.iterdir()) == []
 
 
-def test_the_oldest_go_first(edge, tmp_path):
+@pytest.fixture
+def little(monkeypatch):
+    """Kept touches may take a megabyte."""
+    monkeypatch.setattr(keep, "MOST_BYTES", 1_000_000)
+
+
+def test_the_oldest_go_first(edge, tmp_path, little):
     for i in range(3):
         (tmp_path / f"kept-20200101T00000{i}-00000.npz").write_bytes(bytes(400_000))
     mine = tmp_path / "mine.npz"
     mine.write_bytes(bytes(2_000_000))
-    assert run(edge, tmp_path, "--keep-if", "all", "--keep-mb", 1)[0] == 0
+    assert run(edge, tmp_path, "--keep-if", "all")[0] == 0
     names = sorted(path.name[5:20] for path in tmp_path.glob("kept-*.npz"))
     assert names[0] == "20200101T000001"
     assert len(names) == 3
@@ -86,21 +93,21 @@ def after_the_clock_went_back(folder, labels):
     return path
 
 
-def test_the_order_of_arrival_counts_and_not_the_clock(edge, tmp_path):
+def test_the_order_of_arrival_counts_and_not_the_clock(edge, tmp_path, little):
     later = after_the_clock_went_back(tmp_path, {})
-    assert (
-        "1 recording kept" in run(edge, tmp_path, "--keep-if", "all", "--keep-mb", 1)[2]
-    )
+    assert "1 recording kept" in run(edge, tmp_path, "--keep-if", "all")[2]
     (kept,) = tmp_path.glob("kept-*.npz")
     assert kept.name.startswith("kept-n000042-")
     assert not later.exists()
 
 
-def test_labelled_touches_are_never_removed_and_a_full_folder_is_said(edge, tmp_path):
+def test_labelled_touches_are_never_removed_and_a_full_folder_is_said(
+    edge, tmp_path, little
+):
     labelled = after_the_clock_went_back(tmp_path, {"object": "box"})
-    _, _, err = run(edge, tmp_path, "--keep-if", "all", "--keep-mb", 1)
+    _, _, err = run(edge, tmp_path, "--keep-if", "all")
     assert "0 recordings kept" in err
-    assert "touches are no longer kept, as labelled ones fill the limit" in err
+    assert "touches are no longer kept, as labelled ones fill the 1 MB" in err
     assert list(tmp_path.glob("kept-*.npz")) == [labelled]
 
 
@@ -110,10 +117,12 @@ def test_two_runs_in_one_second_keep_two_touches(edge, tmp_path):
     assert len(list(tmp_path.glob("kept-*.npz"))) == 2
 
 
-def test_what_cannot_be_removed_ends_neither_the_run_nor_the_keeping(edge, tmp_path):
+def test_what_cannot_be_removed_ends_neither_the_run_nor_the_keeping(
+    edge, tmp_path, little
+):
     (tmp_path / "kept-20200101T000000-00000.npz").mkdir()
     (tmp_path / "kept-20200101T000001-00000.npz").write_bytes(bytes(2_000_000))
-    status, _, err = run(edge, tmp_path, "--keep-if", "all", "--keep-mb", 1)
+    status, _, err = run(edge, tmp_path, "--keep-if", "all")
     assert status == 0
     assert "Traceback" not in err
     assert not (tmp_path / "kept-20200101T000001-00000.npz").exists()

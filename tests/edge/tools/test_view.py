@@ -6,6 +6,8 @@ import pty
 import numpy as np
 
 from edge.tools import view
+from edge.touch.frame import Frame
+from edge.touch.layout import SkinLayout
 from tests.conftest import started
 
 
@@ -46,3 +48,69 @@ def test_a_terminal_that_goes_away_ends_view_with_a_sentence(recordings):
         "edge-classify: standard output cannot be written: Input/output error"
     )
     assert err.count("\n") == 1
+
+
+LAYOUT = SkinLayout(rows=4, cols=4, threshold_counts=100, wraps=False)
+
+
+def frame(*places, value=1000, valid=None):
+    counts = np.zeros((4, 4), dtype=np.uint16)
+    for row, col in places:
+        counts[row, col] = value
+    return Frame(t=1.25, counts=counts, valid=valid)
+
+
+def drawn(f):
+    colours, regions = view.skin_colours(f, LAYOUT, 5000)
+    return regions, colours
+
+
+def test_a_region_is_red_to_white_by_force_and_the_rest_grey():
+    colours = [drawn(frame((1, 1), value=v))[1] for v in (101, 500, 1500, 5000, 65535)]
+    touched = [int(c[1, 1]) for c in colours]
+    assert touched == sorted(touched, key=view.TOUCH.index)
+    assert len(set(touched)) == 4
+    assert touched[0] == view.TOUCH[0]
+    assert touched[-1] == view.TOUCH[-1]
+    assert (colours[0][0] == view.REST[0]).all()
+    assert drawn(frame((1, 1), value=100))[1][1, 1] == view.REST[-1]
+
+
+def test_a_taxel_that_cannot_be_read_is_blue():
+    valid = np.ones((4, 4), dtype=bool)
+    valid[2, 3] = False
+    colour = drawn(frame((1, 1), valid=valid))[1]
+    assert np.argwhere(colour == view.LOST).tolist() == [[2, 3]]
+
+
+def test_two_rows_make_a_line_and_colours_are_sent_where_they_change():
+    text = view.picture(
+        np.array([[1, 1, 2], [3, 3, 3], [4, 4, 4]], dtype=np.uint8), wide=1
+    )
+    assert text == (
+        "\x1b[38;5;1;48;5;3m▀▀\x1b[38;5;2;48;5;3m▀\x1b[0m\n\x1b[38;5;4;49m▀▀▀\x1b[0m"
+    )
+
+
+def test_the_caption_is_for_a_person():
+    f = frame((1, 1), (1, 2), (3, 0))
+    regions = drawn(f)[0]
+    assert view.caption(f, regions, LAYOUT) == (
+        "     1.25 s  |  1000 counts on 2 taxels at row 1.0, column 1.5  |  1 more"
+    )
+    newtons = SkinLayout(rows=4, cols=4, counts_per_newton=500.0)
+    assert view.caption(f, regions[:1], newtons) == (
+        "     1.25 s  |  2.00 N on 2 taxels at row 1.0, column 1.5"
+    )
+    valid = np.ones((4, 4), dtype=bool)
+    valid[0] = False
+    assert view.caption(frame(valid=valid), [], LAYOUT).endswith(
+        "no contact  |  4 of 16 taxels cannot be read"
+    )
+
+
+def test_a_skin_that_feels_everything_or_nothing_is_drawn():
+    for counts in (0, 65535):
+        f = Frame(t=0.0, counts=np.full((3, 5), counts, dtype=np.uint16))
+        colour, _ = view.skin_colours(f, SkinLayout(rows=3, cols=5), 1)
+        assert view.picture(colour).count("▀") == 2 * 5 * 2

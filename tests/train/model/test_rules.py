@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from scipy.stats import binom
 
+from edge.early import TEST_SHARE
 from edge.model.info import StoppingRule
-from edge.model.refusal import TEST_SHARE
 from train.model.rules import (
     NEVER,
     RISK,

@@ -3,7 +3,7 @@ for."""
 
 import time
 
-from edge.clock import SystemClock
+from edge.skin.skin import SystemClock
 
 
 def test_it_returns_no_sooner_than_it_was_asked_to():
