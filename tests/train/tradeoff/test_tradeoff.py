@@ -61,8 +61,6 @@ class TestWires:
             *["AD7147"] * 3,
             "microcontroller",
         ]
-        quarter = SkinLayout(rows=8, cols=12, wraps=True)
-        assert "MPR121" in {choice.name.split(",")[0] for choice in wires(quarter)}
 
     def test_the_wire_is_that_of_the_recordings_or_unknown(self, make_touch, forearm):
         touch = make_touch()
