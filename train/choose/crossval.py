@@ -46,7 +46,6 @@ def votes_right(neighbours: Integers, labels: Integers, truth: Integers) -> Bool
 
 def neighbours(
     X: Floats,
-    tested: Floats | None = None,
     *,
     scaling: str = "none",
     max_components: int = MAX_COMPONENTS,
@@ -63,7 +62,6 @@ def neighbours(
 
     Args:
         X: (n, features * samples).
-        tested: (n, features * samples) of the trials left out; X where None.
         scaling: one of `train.model.scaling.SCALINGS`.
         max_components: components tried, from 1.
         max_k: neighbours wanted; there are at most n - 1.
@@ -78,7 +76,7 @@ def neighbours(
         raise InputError(f"leave-one-out needs at least 2 trials, not {n}")
     rows = np.empty((n, max_components, min(max_k, n - 1)), dtype=np.int64)
     with single_thread():
-        for i, query in enumerate(X if tested is None else tested):
+        for i, query in enumerate(X):
             training = np.delete(np.arange(n), i)
             mean, gain, scaled = centred_and_scaled(X[training], scaling, features)
             axes = Spectrum(scaled).leading(max_components)

@@ -37,7 +37,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         help="your price of a wrong decision and of a second's wait: the report names the window "
         "of least cost (default: wrong=10,second=1)",
     )
-    text = "try few candidates at each window, and say by how much that differs"
+    text = "try few candidates at each window; the table of savings has all as a row"
     option("--quick", action="store_true", help=text)
     option("--task", help="task of front.json (default: category, or else the first)")
     option(

@@ -55,11 +55,10 @@ def draw_case(
     case: Case,
     layout: SkinLayout,
     window_s: float,
-    phone: bool,
 ) -> None:
     """Draw the three features of a case beside those of its nearest trials, and the
     pulls."""
-    *axes, below = canvas.subplots(*(4, 1) if phone else (2, 2)).ravel()
+    *axes, below = canvas.subplots(2, 2).ravel()
     legend: dict[str, Any] = {}
     for axis, (name, unit) in zip(axes, units(layout).items(), strict=True):
         legend |= _draw_curves(axis, case, name, window_s)
@@ -138,7 +137,7 @@ def draw(
         canvases = figure.subfigures(len(cases), squeeze=False)[:, 0]
         for canvas, case in zip(canvases, cases, strict=True):
             canvas.suptitle(case.title, fontsize=10, weight="bold")
-            draw_case(canvas, case, recording.layout, model.info.window_s, False)
+            draw_case(canvas, case, recording.layout, model.info.window_s)
         with write_whole(out) as file:
             figure.savefig(file, format="png", dpi=110)
 

@@ -2,7 +2,7 @@
 candidates."""
 
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -19,7 +19,6 @@ from train.choose.evaluate import Result
 from train.data.folds import finest, stratified_folds
 from train.data.labels import NO_CONTACT
 from train.data.vectors import Strings, Vectors
-from train.draw.explanation import MOST_NEAR, Case, draw_case
 from train.fitting import Fitted
 from train.model.pipeline import (
     Choice,
@@ -31,9 +30,9 @@ from train.model.pipeline import (
 )
 from train.model.projection import MOST_STEPS
 from train.report import page
-from train.report.figures import confusion, lines, picture
+from train.report.figures import confusion, lines
 from train.report.score import interval, percent
-from train.report.section import Figure, Row, Section, Table, counted
+from train.report.section import Row, Section, Table, counted
 from train.report.summary import Prices, accuracy, candidates, names, warnings
 from train.report.work import Workers
 
@@ -290,11 +289,9 @@ def _file(task: str) -> str:
 
 
 def _wrong(exported: Exported) -> Section:
-    """The wrong answers, and a picture of the first."""
-    figures: list[Figure] = []
-    fitted = exported.fitted
+    """The wrong answers."""
     rows = []
-    trials = names(fitted.measured)[1]
+    trials = names(exported.fitted.measured)[1]
     for task, answer in exported.answers.items():
         for trial in answer.wrong:
             why = answer.explained[trial]
@@ -310,48 +307,15 @@ def _wrong(exported: Exported) -> Section:
                     "strongest pull": next(iter(why.pulls), ""),
                 }
             )
-        if answer.wrong and not figures:
-            figures.append(_picture(fitted, trials, task, answer))
     text = [
         "A model that had not seen these trials classified them wrongly. The last "
         "column names the feature that pulls a trial most strongly towards the wrong "
         "answer, compared with the nearest trial of the right label. Wrong labels and "
-        "failed touches often stand out here. The picture shows the first of the "
-        "trials; `edge-classify explain` and `python -m train show` explain any other "
-        "recording in the same way."
+        "failed touches often stand out here. `edge-classify explain` and `python -m "
+        "train show` explain any recording in the same way."
     ]
     table = Table("wrong", "Wrong answers", rows)
-    return Section("Wrong answers", text if rows else ["None."], [table], figures)
-
-
-def _picture(
-    fitted: Fitted,
-    trials: Sequence[str],
-    task: str,
-    answer: Answers,
-) -> Figure:
-    """The first wrong answer: the touch's curves over those of the trials that voted
-    for it."""
-    trial = answer.wrong[0]
-    measured = fitted.measured
-    why = answer.explained[trial]
-    wrong = str(answer.answers[-1][trial])
-    neighbours = [*why.voters[:MOST_NEAR], *([] if why.rival is None else [why.rival])]
-    entries = []
-    for n in neighbours:
-        label = answer.classes[n.label]
-        series = measured.trials[n.row].series
-        entries.append(
-            (f"{trials[n.row]}: {label}, {n.distance:.3g} away", series, label == wrong)
-        )
-    title = f"{trials[trial]}: classified as {wrong}, labelled {answer.truth[trial]}"
-    rival = answer.classes[neighbours[-1].label]
-    case = Case(title, measured.trials[trial].series, entries, why.pulls, rival)
-
-    def draw(canvas: Any, phone: bool) -> None:
-        draw_case(canvas, case, measured.layout, fitted.window_s, phone)
-
-    return picture(f"wrong_{_file(task)}", title, draw, (4.8, 8.4))
+    return Section("Wrong answers", text if rows else ["None."], [table])
 
 
 def _features(exported: Exported) -> Section:

@@ -5,13 +5,10 @@ import math
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from itertools import groupby
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
-from scipy.stats import rankdata, spearmanr
 
 from edge.statistics import wilson
 from train.report.figures import STROKES, legend, picture
@@ -21,9 +18,6 @@ Numbers = dict[tuple[str, str, str], float]
 """{(table, setting, task): accuracy in percent}."""
 PAPER = Path(__file__).with_name("paper.csv")
 TRIALS = 140
-REPLICATIONS = 4000
-"""Draws of the bootstrap that tells how a perfect replication would order the
-settings."""
 LISTED = 12
 """The text lists at most so many of the numbers outside the interval."""
 
@@ -112,28 +106,6 @@ def mean_of(data_sets: Sequence[Numbers]) -> Numbers:
     }
 
 
-def negative_by_chance(percents: Sequence[float], tested: int) -> float:
-    """Percent of perfect replications whose rank correlation with the paper would be
-    negative.
-
-    This is a parametric bootstrap. It takes the paper's percents as true, and draws the
-    trials of the paper and of the replication anew, independently for each setting. In
-    fact the settings of a table share their trials, so the result is more likely too
-    high than too low.
-
-    Args:
-        percents: the paper's, for each setting.
-        tested: number of the replication's trials.
-    """
-    rng = np.random.default_rng(0)
-    truth = np.array(percents) / 100.0
-    size = (REPLICATIONS, len(truth))
-    middle = (len(truth) + 1) / 2.0
-    paper = rankdata(rng.binomial(TRIALS, truth, size), axis=1) - middle
-    ours = rankdata(rng.binomial(tested, truth, size), axis=1) - middle
-    return round(100.0 * float(np.mean((paper * ours).sum(axis=1) < 0.0)), 1)
-
-
 def right_despite_the_object(numbers: Numbers) -> float:
     """Percent of the trials with a wrong object whose category is right, as a mean over
     settings.
@@ -152,15 +124,8 @@ def right_despite_the_object(numbers: Numbers) -> float:
     return float(np.mean(shares)) if shares else np.nan
 
 
-def rank_correlation(paper: ArrayLike, ours: ArrayLike) -> float | None:
-    """Spearman's rank correlation; None if all values on one side are equal."""
-    if np.ptp(paper) == 0.0 or np.ptp(ours) == 0.0:
-        return None
-    return float(spearmanr(paper, ours).statistic)
-
-
 def comparison(data_sets: Sequence[Numbers], tested: int) -> Section:
-    """Each of the paper's accuracies beside ours, and the rank correlations.
+    """Each of the paper's accuracies beside ours.
 
     Args:
         data_sets: our percents, for each data set.
@@ -170,10 +135,6 @@ def comparison(data_sets: Sequence[Numbers], tested: int) -> Section:
     shared = [entry for entry in entries() if entry.key in mean]
     row_of = {entry: _beside(entry, mean[entry.key], tested) for entry in shared}
     rows = list(row_of.values())
-    by_task = groupby(row_of, key=lambda entry: (entry.table, entry.task))
-    ranks = [
-        _ranks(list(settings), row_of, data_sets, tested) for _, settings in by_task
-    ]
     # {(within the interval, a headline): number}
     counts = Counter((row["within"], row["headline"]) for row in rows)
     predicted = counts["yes", ""]
@@ -196,21 +157,9 @@ def comparison(data_sets: Sequence[Numbers], tested: int) -> Section:
             "scene were chosen to meet these, so they are no predictions. Of the other "
             f"{predictions}, {predicted} agree. Nothing was changed to meet them.",
             _disagreements([row for row in rows if row["within"] == "no"]),
-            "A negative rank correlation means that the simulation does not support "
-            "the order in which the paper ranks these settings. Beside it stand the "
-            "number of data sets in which it is positive, and the share of perfect "
-            "replications of the paper in which it would be negative by chance.",
             *_wrong_objects({e.key: e.percent for e in row_of}, mean),
         ],
-        [
-            Table("paper", "The paper's accuracies and ours", rows),
-            Table(
-                "paper_ranks",
-                "Spearman's rank correlation with the paper",
-                ranks,
-                narrow=5,
-            ),
-        ],
+        [Table("paper", "The paper's accuracies and ours", rows)],
         [_against(row_of, title)],
     )
 
@@ -234,36 +183,6 @@ def _beside(entry: Entry, ours: float, tested: int) -> Row:
         "to": high,
         "headline": "yes" if entry.headline else "",
         "within": "yes" if low <= 0.0 <= high else "no",
-    }
-
-
-def _ranks(
-    settings: Sequence[Entry],
-    row_of: Mapping[Entry, Row],
-    data_sets: Sequence[Numbers],
-    tested: int,
-) -> Row:
-    """The row of rank correlations for one task in one of the paper's tables.
-
-    Args:
-        settings: the paper's numbers for the task.
-        row_of: their rows beside ours.
-        data_sets: our percents, for each data set.
-        tested: number of our trials.
-    """
-    theirs = [entry.percent for entry in settings]
-    ours = [[numbers[entry.key] for entry in settings] for numbers in data_sets]
-    rank = rank_correlation(theirs, np.mean(ours, axis=0))
-    correlations = [rank_correlation(theirs, percents) for percents in ours]
-    positive = sum(value is not None and value > 0.0 for value in correlations)
-    within = sum(row_of[entry]["within"] == "yes" for entry in settings)
-    return {
-        "table": settings[0].table,
-        "task": settings[0].task,
-        "rank correlation": "all equal" if rank is None else round(rank, 2),
-        "positive in data sets": f"{positive} of {len(data_sets)}",
-        "negative by chance %": negative_by_chance(theirs, tested),
-        "within interval": f"{within} of {len(settings)}",
     }
 
 

@@ -32,8 +32,6 @@ PARTS = (2, 4)
 FEWEST = 20
 """Smallest number of trials for a choice."""
 TIME = "time on this machine"
-ALL = "all candidates"
-"""The change from a quick choice to that of `make export`."""
 Hits = Mapping[tuple[Path, int], bool]
 """{(recording, number of its contact): whether the answer is right}."""
 
@@ -191,7 +189,9 @@ def measure(
     for w in filter(windows.__contains__, WAITS_S):
         wait = Change(f"waiting {w:g} s", f"{WINDOW_S - w:.1f} s sooner", dataset)
         rows.append(row_of(wait, full, hits(dataset, windows[w]), 0.0))
-    thorough = Change(ALL, "longer training", raw, options={"quick": False})
+    thorough = Change(
+        "all candidates", "longer training", raw, options={"quick": False}
+    )
     cases = changes(raw, dataset, rate_hz)
     if quick:
         # The longest first: it runs beside the others.

@@ -13,7 +13,7 @@ from edge.recording import Recording
 from edge.writing import write_whole
 from train.data.dataset import DataSet, read
 from train.report.page import write
-from train.report.section import Row, Section, counted
+from train.report.section import Section, counted
 from train.report.work import Workers
 from train.tradeoff import answer, costs, early
 from train.tradeoff import board as boards
@@ -103,9 +103,6 @@ def tradeoff(data: Sequence[str], out: Path, board_path: str, options: Options) 
         certify=True,
     )
     rows = costs.measure(raw, dataset, points, rate, workers, quick=quick)
-    notes = list(ready.notes)
-    if quick:
-        notes.append(_quick_note(rows, main))
     order = sorted(dataset.tasks, key=lambda task: (task != main, task))
     measured = Measured(
         y={task: dataset.labels(task) for task in order},
@@ -117,7 +114,7 @@ def tradeoff(data: Sequence[str], out: Path, board_path: str, options: Options) 
         wrong=options.wrong,
         second=options.second,
         commands=_commands(data, out, board_path, options),
-        notes=notes,
+        notes=ready.notes,
     )
     report = _write(measured, out, counted(len(dataset.trials), "contact"))
     front = ParetoFront.of(points, main, measured.after_s, quick=quick)
@@ -146,16 +143,6 @@ def _rate_hz(recordings: Sequence[Recording]) -> float:
     """Frames a second, as a median over the recordings whose time goes on."""
     steps_s = [np.median(np.diff(r.t)) for r in recordings if len(r.t) > 1]
     return float(np.median([1.0 / step_s for step_s in steps_s if step_s > 0.0]))
-
-
-def _quick_note(rows: Sequence[Row], task: str) -> str:
-    """A sentence on what a choice among all candidates gains."""
-    (every,) = (row for row in rows if row["change"] == costs.ALL)
-    gain = every.get(f"{task}, points", "")
-    return (
-        "These are quick choices. A choice among all candidates gains "
-        f"{task} {gain} points."
-    )
 
 
 def _main_task(dataset: DataSet, task: str | None) -> str:

@@ -3,7 +3,6 @@ costs on the wire."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 
 import numpy as np
 
@@ -65,7 +64,7 @@ def without(dataset: DataSet) -> DataSet:
 def answers(dataset: DataSet, windows: Sequence[float], workers: Workers) -> Answers:
     """The quick choice at each window."""
     cases = [(dataset, window) for window in windows]
-    results = workers.map("windows", partial(chosen, quick=True), cases)
+    results = workers.map("windows", chosen, cases)
     return Answers(dict(zip(windows, results, strict=True)))
 
 

@@ -11,7 +11,6 @@ from edge.chips.chip import UNUSED, ChipSpec
 from edge.chips.three_axes import ThreeAxisBlock
 from edge.fake.player import frame_rate
 from edge.recording import Recording
-from edge.skin import file as skinfile
 from edge.skin.file import SkinFile
 from edge.skin.wiring import BusSpec
 from edge.touch.layout import SkinLayout
@@ -86,9 +85,8 @@ def wires(layout: SkinLayout) -> list[Wire]:
     """The wirings to compare for a skin, with the fastest chips last.
 
     They are AD7147 on one to three buses, as far as the skin has chips for them and
-    they fit; MPR121 as in the shipped skin file, for a skin of its shape; and a
-    microcontroller that serves 16-bit frames at 1 MHz. The last is the only one that
-    carries three axes; the others then stand for a skin without shear.
+    they fit, and a microcontroller that serves 16-bit frames at 1 MHz. The last is the
+    only one that carries three axes; the others then stand for a skin without shear.
     """
     last = microcontroller(layout)
     layout = replace(layout, axes=None)
@@ -96,9 +94,6 @@ def wires(layout: SkinLayout) -> list[Wire]:
     for buses in (1, 2, 3):
         if fits(layout, buses):
             choices.append(wire("AD7147", spread(layout, buses)))
-    shipped = skinfile.load(skinfile.shipped("mpr121"))
-    if shipped.layout.shape == layout.shape:
-        choices.append(wire("MPR121", replace(shipped, layout=layout)))
     return [*choices, last]
 
 

@@ -27,7 +27,6 @@ from train.study.paper import (
     difference,
     entries,
     mean_of,
-    negative_by_chance,
     right_despite_the_object,
 )
 from train.study.run import require_scene
@@ -75,29 +74,6 @@ def test_a_perfect_replication_differs_by_the_chance_of_both_samples():
 def test_several_data_sets_count_as_their_mean():
     key = ("I", "1", "t")
     assert mean_of([{key: 80.0}, {key: 90.0}]) == {key: 85.0}
-
-
-AGAINST = {key: 142.0 - percent for key, percent in PAPERS.items()}
-
-
-def test_an_order_stands_beside_the_number_of_data_sets_that_have_it():
-    ranks = pd.DataFrame(comparison([PAPERS, PAPERS, AGAINST], 420).tables[1].rows)
-    assert len(ranks) == 8
-    assert (ranks["rank correlation"] == 1.0).all()
-    assert (ranks["positive in data sets"] == "2 of 3").all()
-
-
-def test_close_settings_are_more_often_ordered_otherwise_by_chance():
-    """Mobility is within 6 points in Table II, category within 21."""
-    rows = comparison([PAPERS], 420).tables[1].rows
-    chance = {(row["table"], row["task"]): row["negative by chance %"] for row in rows}
-    assert chance["II", "mobility"] > 5.0
-    assert chance["II", "category"] <= 0.1
-
-
-def test_equal_settings_are_ordered_by_chance_alone():
-    """Ties count as no order."""
-    assert 40.0 < negative_by_chance([80.0] * 6, 1120) < 50.0
 
 
 def test_the_category_is_judged_on_the_trials_with_a_wrong_object():

@@ -97,7 +97,6 @@ def folders(tmp_path_factory):
     path = board_file(folder / "board.json", read([data]).digest)
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(costs, "changes", lambda *_: [])
-        patch.setattr(running, "_quick_note", lambda *_: "")
         patch.setattr(costs, "measure", lambda *_, **__: [])
         options = Options(quick=True, jobs=2)
         report = running.tradeoff([data], folder / "report", str(path), options)
