@@ -36,8 +36,6 @@ def test_a_skin_is_wired_with_every_chip_that_serves_it(forearm):
         *["AD7147"] * 3,
         "microcontroller",
     ]
-    quarter = SkinLayout(rows=8, cols=12, wraps=True)
-    assert "MPR121" in {choice.name.split(",")[0] for choice in wires(quarter)}
 
 
 def test_the_wire_is_that_of_the_recordings_or_unknown(make_touch, forearm):
