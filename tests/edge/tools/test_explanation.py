@@ -38,12 +38,6 @@ def test_a_trial_without_a_label_is_no_rival():
     assert by_hand(BY_HAND._replace(labels=np.array([0, -1]))).rival is None
 
 
-def why_of(info, space, vector, rows, label):
-    """The explanation of a decision, and the distances of the trials that voted."""
-    why = explain(space, vector, rows.tolist(), label, info.features, info.widths)
-    return why, [near.distance for near in why.voters]
-
-
 def parts(space, vector, voters):
     """The distances of voters, by their pulls and the lengths of both coordinates."""
     z = ((vector[space.columns] - space.mean) * space.gain) @ space.weights
@@ -72,14 +66,16 @@ def test_a_task_is_explained_by_its_own_columns_and_trials_at_the_full_window(
         "partial": np.array(["d", "e", "", "d"] * 15),
     }
     _, model = fitted_model(tmp_path / "model.onnx", info, choices, X, y)
+    info = model.info
     assert model.decide(vectors[-1])["partial"].out_of_range
     for name, task in model.info.tasks.items():
         space = Space.of(model, name)
         for vector in vectors:
             decision = model.decide(vector)[name]
             answer = task.labels.index(decision.label)
-            rows = decision.neighbours
-            why, distances = why_of(model.info, space, vector, rows, answer)
+            rows = decision.neighbours.tolist()
+            why = explain(space, vector, rows, answer, info.features, info.widths)
+            distances = [near.distance for near in why.voters]
             assert distances == pytest.approx(decision.distances.tolist(), abs=1e-5)
             for near in (*why.voters, why.rival):
                 assert task.labels[near.label] == y[name][near.row]
