@@ -38,6 +38,10 @@ def test_a_trial_without_a_label_is_no_rival():
     assert by_hand(BY_HAND._replace(labels=np.array([0, -1]))).rival is None
 
 
+def distances_of(why):
+    return [near.distance for near in why.voters]
+
+
 def parts(space, vector, voters):
     """The distances of voters, by their pulls and the lengths of both coordinates."""
     z = ((vector[space.columns] - space.mean) * space.gain) @ space.weights
@@ -75,7 +79,7 @@ def test_a_task_is_explained_by_its_own_columns_and_trials_at_the_full_window(
             answer = task.labels.index(decision.label)
             rows = decision.neighbours.tolist()
             why = explain(space, vector, rows, answer, info.features, info.widths)
-            distances = [near.distance for near in why.voters]
+            distances = distances_of(why)
             assert distances == pytest.approx(decision.distances.tolist(), abs=1e-5)
             for near in (*why.voters, why.rival):
                 assert task.labels[near.label] == y[name][near.row]
