@@ -48,17 +48,13 @@ def test_a_byte_that_changed_since_the_export_is_noticed(exported, tmp_path):
             Model(path)
 
 
-def test_metadata_says_what_the_board_needs(model, forearm):
+def test_metadata_say_what_the_board_needs(model, forearm):
     info = model.info
     assert list(info.tasks) == ["category", "object"]
     assert info.tasks["category"].labels == ("rigid-fixed", "soft-fixed")
     assert info.layout == forearm
     assert info.rows == 16
     assert len(info.data_digest) == 64
-
-
-def test_metadata_say_how_features_are_measured(model):
-    info = model.info
     assert info.window_s == 1.2
     assert info.samples == 40
     assert info.units == {

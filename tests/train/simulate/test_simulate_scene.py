@@ -65,7 +65,6 @@ MISTAKES = [
         0.003,
         "step_s.sliding must be an even part of a frame's 0.01 s",
     ),
-    ("skin.taxel_n_m", 1e18, "skin.taxel_n_m must be a number above 0, at most 1e+15"),
     ("skin.cols", 2, "skin.cols must be a whole number from 3 to 1000, not 2"),
     ("motion.travel_s", 0.1, "the arm's stroke ends after 0.1 s (motion.travel_s, or"),
     (
