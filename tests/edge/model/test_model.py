@@ -55,6 +55,10 @@ def test_metadata_say_what_the_board_needs(model, forearm):
     assert info.layout == forearm
     assert info.rows == 16
     assert len(info.data_digest) == 64
+
+
+def test_metadata_say_how_features_are_measured(model):
+    info = model.info
     assert info.window_s == 1.2
     assert info.samples == 40
     assert info.units == {

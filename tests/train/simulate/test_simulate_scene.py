@@ -106,11 +106,6 @@ MISTAKES = [
         ["sliding"],
         "leaves out sliding, without which object 'thing'",
     ),
-    (
-        "effects.tilt",
-        {"x": 1},
-        "unknown key effects.tilt; allowed: add, leave_out, inertia",
-    ),
     ("object", {}, "object must be a list of tables, not {}"),
     ("object", [], "give at least one [[object]] or [[family]]"),
     (
@@ -120,11 +115,6 @@ MISTAKES = [
     ),
     ("object.0.family", "metal", "family must be one of rigid, foam"),
     ("object.0.conditions", [], "conditions must be fixed, movable or both"),
-    (
-        "object.0.mass_kg",
-        -1.0,
-        "mass_kg must be a number from 1e-06 to 1e+12, not -1.0",
-    ),
     ("object.0.friction_static", None, "friction_static is missing"),
     ("object.0.friction_kinetic", 0.6, "must be at most friction_static (0.5)"),
     (
