@@ -30,9 +30,8 @@ def test_a_wrong_decision_is_a_failure(monkeypatch, tmp_path, edge):
     monkeypatch.setattr(demo, "recordings", lambda: [tmp_path / "wrong.npz"])
     status, _, err = edge("demo")
     tasks = len(Model(demo.MODEL).info.tasks)
-    sentence = f"edge-classify: {tasks - 1} of {tasks} decisions are right\n"
     assert status == 1
-    assert err == sentence
+    assert err.startswith(f"{tasks - 1} of {tasks} decisions are right")
 
 
 def test_the_committed_golden_outputs_are_met(edge):

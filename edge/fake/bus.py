@@ -98,10 +98,9 @@ class FakeTCA9548A(FakeChip):
 def wire_bits(messages: Sequence[Message]) -> int:
     """Bits on the wire: 9 a byte, 1 each for START, repeated START and STOP.
 
-        >>> from edge.bus.tca9548a import CHANNELS
-    from edge.bus.protocol import read, write
-        >>> wire_bits([write(0x2C, [0x00, 0x0B]), read(0x2C, 24)])
-        255
+    >>> from edge.bus.protocol import read, write
+    >>> wire_bits([write(0x2C, [0x00, 0x0B]), read(0x2C, 24)])
+    255
     """
     return 1 + sum(1 + 9 * (1 + len(m.buffer)) for m in messages)
 
@@ -109,15 +108,14 @@ def wire_bits(messages: Sequence[Message]) -> int:
 class FakeBus:
     """A bus with chips and muxes.
 
-        It refuses the shapes that some real adapter refuses: a read anywhere but last
-        (EOPNOTSUPP, Raspberry Pi up to 4), or a second address in one call (EINVAL, Pi 5).
+    It refuses the shapes that some real adapter refuses: a read anywhere but last
+    (EOPNOTSUPP, Raspberry Pi up to 4), or a second address in one call (EINVAL, Pi 5).
 
-        >>> from edge.bus.tca9548a import CHANNELS
-    from edge.bus.protocol import fetch, send
-        >>> bus = FakeBus(chips={0x70: FakeTCA9548A()})
-        >>> send(bus, 0x70, [4])
-        >>> fetch(bus, 0x70, b"", 1)
-        b'\\x04'
+    >>> from edge.bus.protocol import fetch, send
+    >>> bus = FakeBus(chips={0x70: FakeTCA9548A()})
+    >>> send(bus, 0x70, [4])
+    >>> fetch(bus, 0x70, b"", 1)
+    b'\\x04'
     """
 
     def __init__(

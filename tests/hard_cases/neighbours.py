@@ -2,7 +2,6 @@
 
 import numpy as np
 from hypothesis import strategies as st
-from sklearn.neighbors import KNeighborsClassifier
 
 from tests.hard_cases import exact
 from tests.hard_cases.cases import SEEDS, Case, Ladder, decades, powers_of_ten
@@ -163,16 +162,6 @@ def outlier_error(factor, seed):
     return 0.0 if outlier.named else outlier.changed
 
 
-def outlier_price():
-    """The share of other nearest rows for rows farther and farther out."""
-    shares = []
-    for power in (2, 3, 4, 5, 6):
-        outlier = Outlier(10.0**power, 0)
-        named = ", named" if outlier.named else ""
-        shares.append(f"1e{power}: {outlier.changed:.1%}{named}")
-    return f"no warning; our other nearest rows, at a factor of {'; '.join(shares)}"
-
-
 def grid_error(spread, seed):
     """Largest error of a distance, over the longest training row, against unrounded
     numbers."""
@@ -192,20 +181,6 @@ def grid_error(spread, seed):
         graph["distances"] - np.take_along_axis(distances, graph["neighbours"], axis=1)
     )
     return float(errors.max() / np.linalg.norm(z, axis=1).max())
-
-
-def equal_usual():
-    """Equal distances are to be answered with the lower row, which the order of sums
-    decides."""
-    X, queries = lattice(0)
-    lowest = ((X[:, None] - queries) ** 2).sum(axis=2).argmin(axis=0)
-    shares = []
-    for name in ("brute", "kd_tree"):
-        model = KNeighborsClassifier(1, algorithm=name).fit(X, np.arange(len(X)))
-        shares.append(
-            f"scikit-learn {name} {np.mean(model.predict(queries) != lowest):.0%}"
-        )
-    return "not the lower row: " + ", ".join(shares)
 
 
 def few_error(n, classes, same):
@@ -271,7 +246,6 @@ CASES = [
         [{"factor": factor, "seed": 0} for factor in (1e2, 1e3, 1e6)],
         {"factor": powers_of_ten(0.0, 8.0), "seed": SEEDS},
         Ladder("times as far out", decades(0, 12, 0.5), "factor", "1"),
-        outlier_price,
         examples=4,
         bound=0.02,
     ),
@@ -293,7 +267,6 @@ CASES = [
         "equal distances",
         wrong(lattice, Choice("none", 6, 8)),
         **BY_ROWS,
-        usual=equal_usual,
     ),
     answers(
         "vote ties with even k",

@@ -59,7 +59,7 @@ def hostile(width, rng):
     return np.concatenate([plain, far, odd])
 
 
-@pytest.mark.parametrize("path", MODELS, ids=["demo", "golden"])
+@pytest.mark.parametrize("path", MODELS)
 def test_the_models_of_the_checkout_have_the_same_bits_in_both(path):
     golden = path.with_name("golden.npz")
     rng = np.random.default_rng(1)

@@ -48,7 +48,7 @@ def test_a_byte_that_changed_since_the_export_is_noticed(exported, tmp_path):
             Model(path)
 
 
-def test_metadata_says_what_the_board_needs(model, forearm):
+def test_metadata_say_what_the_board_needs(model, forearm):
     info = model.info
     assert list(info.tasks) == ["category", "object"]
     assert info.tasks["category"].labels == ("rigid-fixed", "soft-fixed")

@@ -19,7 +19,6 @@ def trials(counts):
         ("pillow", "pilow", (8, 1)),
         # A short label is a slip of a far more frequent one.
         ("pen", "pem", (20, 2)),
-        ("tin", "Tin", (20, 2)),
         # Labels that differ in case alone are one, however frequent.
         ("box", "Box", (4, 4)),
     ],

@@ -98,7 +98,6 @@ def test_labels_that_say_nothing_of_new_trials_weigh_nothing():
 @pytest.mark.parametrize(
     ("choice", "word"),
     [
-        (Choice("none", 5, 31), "k must be 1 to 30"),
         (Choice("none", 0, 1), "components must be"),
         (Choice("VI", 5, 1), "scaling must be one of none, I"),
     ],

@@ -65,7 +65,6 @@ MISTAKES = [
         0.003,
         "step_s.sliding must be an even part of a frame's 0.01 s",
     ),
-    ("skin.taxel_n_m", 1e18, "skin.taxel_n_m must be a number above 0, at most 1e+15"),
     ("skin.cols", 2, "skin.cols must be a whole number from 3 to 1000, not 2"),
     ("motion.travel_s", 0.1, "the arm's stroke ends after 0.1 s (motion.travel_s, or"),
     (
@@ -107,11 +106,6 @@ MISTAKES = [
         ["sliding"],
         "leaves out sliding, without which object 'thing'",
     ),
-    (
-        "effects.tilt",
-        {"x": 1},
-        "unknown key effects.tilt; allowed: add, leave_out, inertia",
-    ),
     ("object", {}, "object must be a list of tables, not {}"),
     ("object", [], "give at least one [[object]] or [[family]]"),
     (
@@ -121,11 +115,6 @@ MISTAKES = [
     ),
     ("object.0.family", "metal", "family must be one of rigid, foam"),
     ("object.0.conditions", [], "conditions must be fixed, movable or both"),
-    (
-        "object.0.mass_kg",
-        -1.0,
-        "mass_kg must be a number from 1e-06 to 1e+12, not -1.0",
-    ),
     ("object.0.friction_static", None, "friction_static is missing"),
     ("object.0.friction_kinetic", 0.6, "must be at most friction_static (0.5)"),
     (

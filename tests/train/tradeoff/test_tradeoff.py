@@ -87,10 +87,8 @@ def test_export_writes_the_very_model_of_a_point(recordings, fronted, tmp_path, 
     info = Model(tmp_path / "model.onnx").info
     task = info.tasks["category"]
     assert info.window_s == 0.4
-    assert task.features == choice.choice.features
-    assert task.scaling == choice.choice.scaling
-    assert task.k == choice.choice.k
-    assert task.projection == choice.choice.projection
+    for name in ("features", "scaling", "k", "projection"):
+        assert getattr(task, name) == getattr(choice.choice, name)
     assert task.accuracy == choice.accuracy.accuracy
 
 
