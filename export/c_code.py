@@ -40,11 +40,11 @@ MOST_SUMMED = 128
 ALONE = {*measures.ALONE.values(), ("contact", "area")} - {("skin", "stiffness")}
 """(zone, quantity) that need no sums of a zone."""
 TYPES_IN_C = {
-    "EC_INT8": "int8_t",
-    "EC_INT16": "int16_t",
-    "EC_INT32": "int32_t",
-    "EC_FLOAT": "float",
-    "EC_DOUBLE": "double",
+    "int8": "int8_t",
+    "int16": "int16_t",
+    "int32": "int32_t",
+    "float32": "float",
+    "float64": "double",
 }
 ENDS = "label scores distances neighbours label_distances".split()
 OF_LAYOUT = "rows cols wraps threshold_counts onset release_s radius_m row0_z_m".split()
@@ -83,7 +83,7 @@ def write(
     scratch = _features(source, model.info, frames)
     _kernels(source, model.info)
     least = model.info.width + scratch
-    graph = CompiledGraph(model, list(model.outputs), points, least)
+    graph = CompiledGraph(model, points, least)
     source.ram = 8 * graph.arena
     source.define("ARENA", graph.arena)
     _skin(source, model.info, frames)
@@ -325,16 +325,14 @@ def _graph(source: Source, graph: CompiledGraph) -> None:
     """The steps and the tables of the graph."""
     tables = []
     for i, table in enumerate(graph.tables):
-        numbers = table.values.reshape(-1)
-        source.array(f"static const {TYPES_IN_C[table.kind]}", f"t{i}", numbers)
-        source.flash += table.values.nbytes
-        by_point = table.values.ndim - 1
-        tables.append([f"t{i}", table.values.shape[-1], table.kind, by_point])
+        kind = table.dtype.name
+        source.array(f"static const {TYPES_IN_C[kind]}", f"t{i}", table.reshape(-1))
+        source.flash += table.nbytes
+        by_point = table.ndim - 1
+        tables.append([f"t{i}", table.shape[-1], f"EC_{kind.upper()}", by_point])
     steps = []
     for s in graph.steps:
-        steps.append(
-            [f"EC_{s.operator.upper()}", s.points, s.inputs, s.outputs, s.sizes]
-        )
+        steps.append([f"EC_{s.operator.upper()}", s.inputs, s.outputs, s.sizes])
         is_product = s.operator == "Gemm"
         source.work += 16 * prod(s.sizes[:2]) if is_product else 400 * max(s.sizes)
     source.flash += 44 * len(steps)

@@ -149,7 +149,7 @@ extern const ec_kernels ec_taxel_kernels;
 extern const ec_kernels ec_zone_kernels;
 
 /* model.c: the numbers of graph.c, each in the smallest type that holds it exactly. */
-enum { EC_INT8, EC_INT16, EC_INT32, EC_FLOAT, EC_DOUBLE };
+enum { EC_INT8, EC_INT16, EC_INT32, EC_FLOAT32, EC_FLOAT64 };
 
 typedef struct {
   const void *data;
@@ -161,7 +161,6 @@ typedef struct {
 /* A node of the graph. Places below EC_ARENA are in the arena; the others are tables. */
 typedef struct {
   uint8_t operator;
-  uint16_t points; /* bit i: decision point i needs it */
   uint32_t inputs[3];
   uint32_t outputs[2];
   uint32_t sizes[4];
