@@ -23,7 +23,7 @@ static operand operand_at(uint32_t place) {
 
 static double at(operand x, uint32_t i) {
   if (x.values) return x.values[i];
-  if (x.table->by_point) i += now * x.table->size;
+  i += now * x.table->stride;
   switch (x.table->type) {
     case EC_INT8: return ((const int8_t *)x.table->data)[i];
     case EC_INT16: return ((const int16_t *)x.table->data)[i];
@@ -87,7 +87,7 @@ static bool are_whole(operand x, uint32_t n) {
 /* A column's sum of products in integers, which many processors have faster than doubles. */
 static double whole_sum(const ec_table *matrix, uint32_t n, uint32_t i, uint32_t m) {
   int64_t sum = 0;
-  if (matrix->by_point) i += now * matrix->size;
+  i += now * matrix->stride;
   for (uint32_t k = 0; k < n; k++, i += m) {
     switch (matrix->type) {
       case EC_INT8: sum += (int64_t)factors[k] * ((const int8_t *)matrix->data)[i]; break;
