@@ -33,17 +33,6 @@ static double at(operand x, uint32_t i) {
   }
 }
 
-static double combined(uint8_t operator, double a, double b) {
-  switch (operator) {
-    case EC_ADD: return a + b;
-    case EC_SUB: return a - b;
-    case EC_MUL: return a * b;
-    case EC_DIV: return a / b;
-    case EC_MAX: return a > b || a != a ? a : b;
-    default: return a <= b ? 1.0 : 0.0;
-  }
-}
-
 /* sizes: of the output; of the inputs, each as many or 1. */
 static void element_wise(const ec_step *step) {
   operand a = operand_at(step->inputs[0]);
@@ -51,23 +40,21 @@ static void element_wise(const ec_step *step) {
   operand c = operand_at(step->inputs[2]);
   double *out = ec_arena + step->outputs[0];
   for (uint32_t i = 0; i < step->sizes[0]; i++) {
-    uint32_t ia = step->sizes[1] > 1 ? i : 0;
-    uint32_t ib = step->sizes[2] > 1 ? i : 0;
-    uint32_t ic = step->sizes[3] > 1 ? i : 0;
-    double x = at(a, ia);
+    double x = at(a, step->sizes[1] > 1 ? i : 0);
+    double y = at(b, step->sizes[2] > 1 ? i : 0);
+    double z = at(c, step->sizes[3] > 1 ? i : 0);
     switch (step->operator) {
-      case EC_WHERE: x = x != 0.0 ? at(b, ib) : at(c, ic); break;
-      case EC_CLIP: {
-        double low = at(b, ib);
-        double high = at(c, ic);
-        x = x < low ? low : x > high ? high : x;
-        break;
-      }
-      case EC_ROUND: x = ec_rint(x); break;
-      case EC_SQRT: x = ec_sqrt(x); break;
-      default: x = combined(step->operator, x, at(b, ib));
+      case EC_ADD: out[i] = x + y; break;
+      case EC_SUB: out[i] = x - y; break;
+      case EC_MUL: out[i] = x * y; break;
+      case EC_DIV: out[i] = x / y; break;
+      case EC_MAX: out[i] = x > y || x != x ? x : y; break;
+      case EC_LESSOREQUAL: out[i] = x <= y ? 1.0 : 0.0; break;
+      case EC_WHERE: out[i] = x != 0.0 ? y : z; break;
+      case EC_CLIP: out[i] = x < y ? y : x > z ? z : x; break;
+      case EC_ROUND: out[i] = ec_rint(x); break;
+      default: out[i] = ec_sqrt(x);
     }
-    out[i] = x;
   }
 }
 
