@@ -26,7 +26,7 @@ from edge.touch.feature import Feature
 from edge.touch.kernels import BIASES, KernelTable, mixes
 from edge.touch.layout import SkinLayout
 from edge.touch.zones import Zones
-from export.c_graph import CompiledGraph
+from export.c_graph import TYPES, CompiledGraph
 
 ROOMS = Path(__file__).parent / "c"
 RATE_HZ = 120.0
@@ -39,13 +39,6 @@ MOST_SUMMED = 128
 """Samples beyond which numpy sums up in halves."""
 ALONE = {*measures.ALONE.values(), ("contact", "area")} - {("skin", "stiffness")}
 """(zone, quantity) that need no sums of a zone."""
-TYPES_IN_C = {
-    "int8": "int8_t",
-    "int16": "int16_t",
-    "int32": "int32_t",
-    "float32": "float",
-    "float64": "double",
-}
 ENDS = "label scores distances neighbours label_distances".split()
 OF_LAYOUT = "rows cols wraps threshold_counts onset release_s radius_m row0_z_m".split()
 OF_INFO = "debounce window_s width joints dof".split()
@@ -178,9 +171,10 @@ class Source:
         largest = 0
         for feature, width in zip(self._types, self._info.widths, strict=True):
             samples = feature.kernels or feature.samples or self._info.samples
-            summed = feature.summary not in ("", "rate")
-            count = width if summed else width // samples
-            largest = max(largest, summed * count * samples)
+            count = width // samples
+            if feature.summary not in ("", "rate"):
+                count = width
+                largest = max(largest, count * samples)
             rows.append(_feature(feature, self._layout, samples, count))
         self.define(FEATURES=len(rows))
         self.constant("ec_feature ec_features[]", rows)
@@ -266,7 +260,7 @@ class Source:
         tables = []
         for table in graph.tables:
             kind = table.dtype.name
-            values = array(TYPES_IN_C[kind], table.reshape(-1))
+            values = array(TYPES[kind], table.reshape(-1))
             stride = (table.ndim - 1) * table.shape[-1]
             tables.append([values, stride, f"EC_{kind.upper()}"])
             self.flash += table.nbytes
@@ -304,13 +298,10 @@ class Source:
             ]
             rows.append(row)
             labels.append(array("char *const", map(quoted, task.labels)))
-        self.define(
-            TASKS=len(names),
-            MOST_LABELS=max(len(task.labels) for task in tasks.values()),
-            PLACE_OUT_OF_RANGE=places.get("out_of_range", 0),
-            PLACE_NOVELTY=places.get("novelty", 0),
-            PLACE_REMOTENESS=places.get("remoteness", 0),
-        )
+        most = max(len(task.labels) for task in tasks.values())
+        self.define(TASKS=len(names), MOST_LABELS=most)
+        for output in ("out_of_range", "novelty", "remoteness"):
+            self.define(**{f"PLACE_{output.upper()}": places.get(output, 0)})
         order = sorted(range(len(names)), key=lambda i: bool(tasks[names[i]].factors))
         self.constant("ec_task ec_tasks[]", rows)
         self.constant("uint8_t ec_order[]", order)

@@ -23,8 +23,14 @@ NAMES = {
     "Squeeze": "Max",
 }
 """{operator: that of C}; the larger of a value and itself is a copy."""
-TYPES = ("int8", "int16", "int32", "float32", "float64")
-"""Types of tables, from the smallest."""
+TYPES = {
+    "int8": "int8_t",
+    "int16": "int16_t",
+    "int32": "int32_t",
+    "float32": "float",
+    "float64": "double",
+}
+"""{type of a table: that in C}, from the smallest."""
 
 
 @dataclass(frozen=True)
