@@ -175,10 +175,25 @@ class Source:
             if feature.summary not in ("", "rate"):
                 count = width
                 largest = max(largest, count * samples)
-            rows.append(_feature(feature, self._layout, samples, count))
+            rows.append(self._feature(feature, samples, count))
         self.define(FEATURES=len(rows))
         self.constant("ec_feature ec_features[]", rows)
         return largest + (len(measures.QUANTITIES) + 4) * self._frames
+
+    def _feature(self, feature: Feature, samples: int, rows: int) -> list[object]:
+        """The `ec_feature` of a feature."""
+        alone = (feature.zone, feature.quantity) in ALONE
+        of_region = "REGION_" * (alone and feature.zone == "contact")
+        kinds = [f"EC_T_{kind.upper()}" for kind in feature.transforms]
+        return [
+            float(transforms.floor_of(feature, self._layout)),
+            samples,
+            rows,
+            "EC_NO_ZONE" if alone else f"EC_{feature.zone.upper()}",
+            f"EC_Q_{of_region}{feature.quantity.upper()}",
+            kinds,
+            f"EC_S_{feature.summary.upper()}",
+        ]
 
     def kernels(self) -> None:
         """The tables of the features that are made of kernels."""
@@ -375,20 +390,6 @@ def lacks(info: ModelInfo) -> Iterable[str]:
         summed = feature.summary in ("mean", "deviation", "roughness")
         if summed and (feature.samples or info.samples) > MOST_SUMMED:
             yield f"{feature.name} sums up more than {MOST_SUMMED} samples"
-
-
-def _feature(
-    feature: Feature, layout: SkinLayout, samples: int, rows: int
-) -> list[Any]:
-    """The `ec_feature` of a feature."""
-    alone = (feature.zone, feature.quantity) in ALONE
-    of_region = "REGION_" * (alone and feature.zone == "contact")
-    quantity = f"EC_Q_{of_region}{feature.quantity.upper()}"
-    zone = "EC_NO_ZONE" if alone else f"EC_{feature.zone.upper()}"
-    kinds = [f"EC_T_{kind.upper()}" for kind in (*feature.transforms, *["none"] * 3)]
-    floor = float(transforms.floor_of(feature, layout))
-    summary = f"EC_S_{feature.summary.upper()}"
-    return [floor, samples, rows, zone, quantity, kinds[:3], summary]
 
 
 def _of_taxels(layout: SkinLayout, cells: Cells) -> Array:
