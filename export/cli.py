@@ -59,6 +59,7 @@ def parser() -> argparse.ArgumentParser:
     _add_settings(top)
     _add_choice(top)
     _add_results(top)
+    _add_c(top)
     top.set_defaults(run=run)
     return top
 
@@ -92,10 +93,17 @@ def _add_settings(top: argparse.ArgumentParser) -> None:
         f"single features, ZONE_QUANTITY of {', '.join(measures.ZONES)} and "
         f"{', '.join(measures.QUANTITIES)}, or {', '.join(measures.ALONE)}",
     )
-    text = "fix the projection: principal components or discriminants"
-    option("--projection", choices=KINDS, help=text)
-    text = "values of each feature (default: %(default)s)"
-    option("--samples", type=within(int, 2, 1000), default=SAMPLES, help=text)
+    option(
+        "--projection",
+        choices=KINDS,
+        help="fix the projection: principal components or discriminants",
+    )
+    option(
+        "--samples",
+        type=within(int, 2, 1000),
+        default=SAMPLES,
+        help="values of each feature (default: %(default)s)",
+    )
     option("--scaling", choices=SCALINGS, help="fix the scaling (paper, Eqs. 1 to 5)")
     option("--components", type=count, help="fix the number of principal components")
     option("-k", "--k", type=count, help="fix the number of neighbours")
@@ -154,23 +162,50 @@ def _add_results(top: argparse.ArgumentParser) -> None:
         help="the file with the points (default: %(default)s)",
     )
     add_arm(top, "for recordings whose joint angles name no arm (default: Cody's)")
-    text = "also write OUT/report.html, as `make export` does"
-    option("--report", action="store_true", help=text)
-    text = "recordings that are scored and never fitted, such as those of another day"
-    option("--test", nargs="+", metavar="REC", help=text)
-    text = "also write the model as C99 for a microcontroller, into this folder"
-    option("--c", type=Path, metavar="DIR", help=text)
-    text = "with --c: decide early, wrongly at most this often (default: at the full window)"
-    option("--c-error", type=float, metavar="RATE", help=text)
-    text = "with --c: kB that it may take; early decisions are left out first"
-    option("--flash", type=count, metavar="KB", help=text)
-    text = "a former model.onnx, which is scored on the --test recordings too"
-    option("--compare", metavar="old.onnx", help=text)
+    option(
+        "--report",
+        action="store_true",
+        help="also write OUT/report.html, as `make export` does",
+    )
+    option(
+        "--test",
+        nargs="+",
+        metavar="REC",
+        help="recordings that are scored and never fitted, such as those of another day",
+    )
+    option(
+        "--compare",
+        metavar="old.onnx",
+        help="a former model.onnx, which is scored on the --test recordings too",
+    )
     option(
         "--jobs",
         type=count,
         default=cpu_count(),
         help="processes (default: all cores)",
+    )
+
+
+def _add_c(top: argparse.ArgumentParser) -> None:
+    """The model in C."""
+    option = top.add_argument
+    option(
+        "--c",
+        type=Path,
+        metavar="DIR",
+        help="also write the model as C99 for a microcontroller, into this folder",
+    )
+    option(
+        "--c-error",
+        type=float,
+        metavar="RATE",
+        help="with --c: decide early, wrongly at most this often (default: at the full window)",
+    )
+    option(
+        "--flash",
+        type=count,
+        metavar="KB",
+        help="with --c: kB that it may take; early decisions are left out first",
     )
 
 
@@ -206,8 +241,6 @@ def _written(
     labels = [trial.labels for trial in fitted.dataset.trials]
     print("\n".join(counts_text(labels)), end="\n\n", file=sys.stderr)
     print(summary(fitted, prices), file=sys.stderr)
-    for line in by_folder(fitted, arguments.data):
-        print(line, file=sys.stderr)
     print(f"{path} ({size / 1024:.0f} kB)\n{path.with_name('golden.npz')}")
     if arguments.c:
         from export.c_code import export
@@ -237,27 +270,6 @@ def _check_apart(data: list[str], held_out: Sequence[Path]) -> None:
                 f"{file}: is in --data and in --test; what is scored must not be fitted: "
                 "move it out of the folder of --data"
             )
-
-
-def by_folder(fitted: Fitted, data: Sequence[str]) -> list[str]:
-    """A line for each task: the trials of each folder that are answered right by models
-    fitted without them. Empty where the data are no more than one folder."""
-    folders = {name: Path(name).resolve() for name in data if Path(name).is_dir()}
-    if len(folders) < 2:
-        return []
-    lines = []
-    for task, chosen in fitted.chosen.items():
-        judged = (chosen.folds >= 0) & (fitted.dataset.labels(task) != "")
-        trials = [fitted.dataset.trials[i] for i in judged.nonzero()[0]]
-        hits = chosen.accuracy.hits
-        assert hits is not None
-        tallies = []
-        for name, folder in folders.items():
-            inside = [trial.path.resolve().is_relative_to(folder) for trial in trials]
-            if any(inside):
-                tallies.append(f"{name} {hits[inside].sum()} of {sum(inside)}")
-        lines.append(f"{task} by folder: {', '.join(tallies)}")
-    return lines
 
 
 def _fit(arguments: argparse.Namespace) -> Fitted:
@@ -290,21 +302,14 @@ def held_out_text(
     former: Model | None,
     recordings: Sequence[Path],
 ) -> str:
-    """The accuracy on recordings that were not fitted, also of a former model."""
+    """The accuracy on recordings of --test, also of a former model."""
     summary = _scored(model, recordings)
-    lines = [_heading(model, summary), summary.text()]
+    paragraphs = [f"{model.path} on the recordings of --test:", summary.text()]
     if former is not None:
         before = _scored(former, recordings)
-        lines += [_heading(former, before), before.text()]
-        lines.append(compared(former.path, before, model.path, summary))
-    return "\n\n".join(lines)
-
-
-def _heading(model: Model, summary: Summary) -> str:
-    """What a model was scored on."""
-    if summary.as_trained:
-        return f"{model.path} on recordings with {summary.as_trained} of its training:"
-    return f"{model.path} on recordings that it was not fitted on:"
+        paragraphs += [f"{former.path} on them:", before.text()]
+        paragraphs.append(compared(former.path, before, model.path, summary))
+    return "\n\n".join(paragraphs)
 
 
 def _scored(model: Model, recordings: Sequence[Path]) -> Summary:
@@ -312,8 +317,7 @@ def _scored(model: Model, recordings: Sequence[Path]) -> Summary:
     summary = Summary(model.info.tasks)
     for file in recordings:
         recording = load(file)
-        events = decide(model, recording, str(file))
-        summary.add(recording.labels, events, str(file))
+        summary.add(recording.labels, decide(model, recording, str(file)), str(file))
     return summary
 
 

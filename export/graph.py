@@ -19,7 +19,7 @@ from onnx import helper, numpy_helper
 from skl2onnx import convert_sklearn, update_registered_converter
 from skl2onnx.common.data_types import DoubleTensorType, Int64TensorType
 
-from edge.arrays import Array, Booleans, Floats, Integers
+from edge.arrays import Booleans, Floats, Integers
 from edge.model import onnx_file
 from edge.model.info import METADATA_KEY, ModelInfo
 from edge.model.metadata import to_json
@@ -312,32 +312,6 @@ def _nearest(build: Builder, squares: str) -> str:
     return build.node("Sqrt", nearest)
 
 
-def label_tables(labels: Integers, classes: int) -> dict[str, Array]:
-    """The constants from which the graph takes the distances of labels.
-
-    Args:
-        labels: (n,) of the trials; -1 where one has none.
-        classes: how many labels there are.
-
-    Returns:
-        `members` (classes, largest): the trials of each label, filled up with n;
-        `most` (1,): the largest count; `taken` (classes, most): True in the first
-        columns of each label, as many as its count; `counts` (classes,): how many
-        trials stand for each label.
-    """
-    sizes = np.bincount(labels[labels >= 0], minlength=classes)
-    counts = nearest_of_label(sizes)
-    members = np.full((classes, int(sizes.max())), len(labels))
-    for label, size in enumerate(sizes):
-        members[label, :size] = np.flatnonzero(labels == label)
-    return {
-        "members": members,
-        "most": counts.max(keepdims=True),
-        "taken": np.arange(counts.max()) < counts[:, None],
-        "counts": counts.astype(np.float64),
-    }
-
-
 def _label_distances(
     build: Builder,
     task: str,
@@ -346,11 +320,18 @@ def _label_distances(
     classes: int,
 ) -> str:
     """Name of `train.model.pipeline.label_distances` (n, labels) of squared distances (n,
-    rows)."""
-    rows, most, is_vote, counts = (
-        build.constant(table, f"{name} of {task}")
-        for name, table in label_tables(labels, classes).items()
-    )
+    rows) to trials of labels (rows,), -1 where one has none."""
+    sizes = np.bincount(labels[labels >= 0], minlength=classes)
+    counts = nearest_of_label(sizes)
+    # The trials of each label, filled up with a row that is infinitely far.
+    members = np.full((classes, int(sizes.max())), len(labels))
+    for label, size in enumerate(sizes):
+        members[label, :size] = np.flatnonzero(labels == label)
+    taken = np.arange(counts.max()) < counts[:, None]
+    rows = build.constant(members, f"members of {task}")
+    most = build.constant(counts.max(keepdims=True), f"most of {task}")
+    is_vote = build.constant(taken, f"taken of {task}")
+    divisors = build.constant(counts.astype(np.float64), f"counts of {task}")
     wider = build.node("Pad", squares, [0, 0, 0, 1], np.inf)
     squares_of_label = build.node("Gather", wider, rows, axis=1)
     nearest, _ = build.nodes(
@@ -364,29 +345,30 @@ def _label_distances(
     roots = build.node("Round", build.node("Sqrt", nearest))
     counted = build.node("Where", is_vote, roots, 0.0)
     total = build.node("ReduceSum", counted, [2], keepdims=0)
-    return build.node("Div", total, counts)
+    return build.node("Div", total, divisors)
 
 
 def _outputs(model: Fitted) -> dict[str, Any]:
     """{output: its type}; ONNX Runtime derives the sizes from the constants."""
     sequential = isinstance(model, SequentialClassifier)
+    numbers = DoubleTensorType([None])
+    table = DoubleTensorType([None, None])
     of_task = {
         "label": Int64TensorType([None]),
-        "scores": DoubleTensorType([None, None]),
-        "distances": DoubleTensorType([None, None]),
+        "scores": table,
+        "distances": table,
         "neighbours": Int64TensorType([None, None]),
     }
     if sequential or model.products_:
-        of_task["label_distances"] = DoubleTensorType([None, None])
+        of_task["label_distances"] = table
     outputs = {
         f"{task}_{name}": kind
         for task in model.choices
         for name, kind in of_task.items()
     }
-    outputs["out_of_range"] = DoubleTensorType([None])
+    outputs["out_of_range"] = numbers
     if sequential:
-        outputs["novelty"] = DoubleTensorType([None])
-        outputs["remoteness"] = DoubleTensorType([None])
+        outputs |= {"novelty": numbers, "remoteness": numbers}
     return outputs
 
 

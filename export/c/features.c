@@ -29,6 +29,14 @@ static void feel(double window_s) {
 
 static double absolute(double x) { return x < 0.0 ? -x : x; }
 
+static double largest_of(const double *x, uint32_t n) {
+  double largest = 0.0;
+  for (uint32_t i = 0; i < n; i++) {
+    if (absolute(x[i]) > largest) largest = absolute(x[i]);
+  }
+  return largest;
+}
+
 /* numpy's order of a sum, of at most 128 numbers. */
 static double summed(const double *x, uint32_t n) {
   double sum = 0.0;
@@ -155,10 +163,7 @@ static void sample(const ec_feature *feature, uint32_t row, double step_s, doubl
 
 /* size: of all rows of the feature. */
 static void transform(uint8_t kind, double *x, uint32_t size, double floor) {
-  double largest = 0.0;
-  for (uint32_t i = 0; i < size; i++) {
-    if (absolute(x[i]) > largest) largest = absolute(x[i]);
-  }
+  double largest = largest_of(x, size);
   for (uint32_t i = 0; i < size; i++) {
     if (kind == EC_T_LOG) {
       x[i] = x[i] + floor > 0.0 ? ec_log(x[i] + floor) : 0.0;
@@ -189,11 +194,7 @@ static double summary(uint8_t kind, double *x, uint32_t n) {
     return summed(x, n - 1) / (n - 1);
   }
   if (kind == EC_S_MEAN) return summed(x, n) / n;
-  double largest = 0.0;
-  for (uint32_t i = 0; i < n; i++) {
-    if (absolute(x[i]) > largest) largest = absolute(x[i]);
-  }
-  int power = ec_exponent(largest);
+  int power = ec_exponent(largest_of(x, n));
   int half = power / 2;
   for (uint32_t i = 0; i < n; i++) x[i] = x[i] * ec_exp2(-half) * ec_exp2(half - power);
   double mean = summed(x, n) / n;

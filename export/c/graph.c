@@ -23,24 +23,13 @@ static operand operand_at(uint32_t place) {
 
 static double at(operand x, uint32_t i) {
   if (x.values) return x.values[i];
-  if (x.table->by_point) i += now * x.table->size;
+  i += now * x.table->stride;
   switch (x.table->type) {
     case EC_INT8: return ((const int8_t *)x.table->data)[i];
     case EC_INT16: return ((const int16_t *)x.table->data)[i];
     case EC_INT32: return ((const int32_t *)x.table->data)[i];
-    case EC_FLOAT: return (double)((const float *)x.table->data)[i];
+    case EC_FLOAT32: return (double)((const float *)x.table->data)[i];
     default: return ((const double *)x.table->data)[i];
-  }
-}
-
-static double combined(uint8_t operator, double a, double b) {
-  switch (operator) {
-    case EC_ADD: return a + b;
-    case EC_SUB: return a - b;
-    case EC_MUL: return a * b;
-    case EC_DIV: return a / b;
-    case EC_MAX: return a > b || a != a ? a : b;
-    default: return a <= b ? 1.0 : 0.0;
   }
 }
 
@@ -51,23 +40,21 @@ static void element_wise(const ec_step *step) {
   operand c = operand_at(step->inputs[2]);
   double *out = ec_arena + step->outputs[0];
   for (uint32_t i = 0; i < step->sizes[0]; i++) {
-    uint32_t ia = step->sizes[1] > 1 ? i : 0;
-    uint32_t ib = step->sizes[2] > 1 ? i : 0;
-    uint32_t ic = step->sizes[3] > 1 ? i : 0;
-    double x = at(a, ia);
+    double x = at(a, step->sizes[1] > 1 ? i : 0);
+    double y = at(b, step->sizes[2] > 1 ? i : 0);
+    double z = at(c, step->sizes[3] > 1 ? i : 0);
     switch (step->operator) {
-      case EC_WHERE: x = x != 0.0 ? at(b, ib) : at(c, ic); break;
-      case EC_CLIP: {
-        double low = at(b, ib);
-        double high = at(c, ic);
-        x = x < low ? low : x > high ? high : x;
-        break;
-      }
-      case EC_ROUND: x = ec_rint(x); break;
-      case EC_SQRT: x = ec_sqrt(x); break;
-      default: x = combined(step->operator, x, at(b, ib));
+      case EC_ADD: out[i] = x + y; break;
+      case EC_SUB: out[i] = x - y; break;
+      case EC_MUL: out[i] = x * y; break;
+      case EC_DIV: out[i] = x / y; break;
+      case EC_MAX: out[i] = x > y || x != x ? x : y; break;
+      case EC_LESSOREQUAL: out[i] = x <= y ? 1.0 : 0.0; break;
+      case EC_WHERE: out[i] = x != 0.0 ? y : z; break;
+      case EC_CLIP: out[i] = x < y ? y : x > z ? z : x; break;
+      case EC_ROUND: out[i] = ec_rint(x); break;
+      default: out[i] = ec_sqrt(x);
     }
-    out[i] = x;
   }
 }
 
@@ -87,7 +74,7 @@ static bool are_whole(operand x, uint32_t n) {
 /* A column's sum of products in integers, which many processors have faster than doubles. */
 static double whole_sum(const ec_table *matrix, uint32_t n, uint32_t i, uint32_t m) {
   int64_t sum = 0;
-  if (matrix->by_point) i += now * matrix->size;
+  i += now * matrix->stride;
   for (uint32_t k = 0; k < n; k++, i += m) {
     switch (matrix->type) {
       case EC_INT8: sum += (int64_t)factors[k] * ((const int8_t *)matrix->data)[i]; break;
@@ -190,7 +177,6 @@ static void arg_max(const ec_step *step) {
 void ec_graph(uint32_t point) {
   now = point;
   for (const ec_step *step = ec_steps; step < ec_steps + EC_STEPS; step++) {
-    if (!(step->points >> point & 1)) continue;
     switch (step->operator) {
       case EC_GEMM: gemm(step); break;
       case EC_REDUCEL1:

@@ -140,7 +140,6 @@ typedef struct {
   const int8_t *shifts; /* of each channel */
   const int32_t *biases;
   const uint8_t *mixes; /* of each convolution: how many channels, and which */
-  uint16_t channels;
   uint8_t biases_of_dilation[4];
 } ec_kernels;
 
@@ -149,19 +148,17 @@ extern const ec_kernels ec_taxel_kernels;
 extern const ec_kernels ec_zone_kernels;
 
 /* model.c: the numbers of graph.c, each in the smallest type that holds it exactly. */
-enum { EC_INT8, EC_INT16, EC_INT32, EC_FLOAT, EC_DOUBLE };
+enum { EC_INT8, EC_INT16, EC_INT32, EC_FLOAT32, EC_FLOAT64 };
 
 typedef struct {
   const void *data;
-  uint32_t size; /* of one decision point */
+  uint32_t stride; /* from a decision point to the next; 0 where they share the numbers */
   uint8_t type;
-  uint8_t by_point; /* whether each decision point has numbers of its own */
 } ec_table;
 
 /* A node of the graph. Places below EC_ARENA are in the arena; the others are tables. */
 typedef struct {
   uint8_t operator;
-  uint16_t points; /* bit i: decision point i needs it */
   uint32_t inputs[3];
   uint32_t outputs[2];
   uint32_t sizes[4];

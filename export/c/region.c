@@ -133,7 +133,7 @@ void ec_sums(const ec_region *region, int64_t *rows, int64_t *cols) {
 }
 
 /* Largest count, taxels, sum of counts, and the sums of counts times row, column, row squared, row
-   times column, column squared. */
+   times column, column squared, into numbers that are 0. */
 void ec_zone(
     ec_zone_name zone, const ec_set active, const ec_region *region, const uint16_t *counts,
     int64_t numbers[EC_ZONE_WIDTH]) {
@@ -146,7 +146,6 @@ void ec_zone(
     for (uint32_t i = 0; i < TAXELS; i++) weights[i % EC_COLS] += taxels[i] ? counts[i] : 0;
     cut = best_cut(weights);
   }
-  for (uint32_t i = 0; i < EC_ZONE_WIDTH; i++) numbers[i] = 0;
   for (uint32_t i = 0; i < TAXELS; i++) {
     uint32_t col = i % EC_COLS;
     if (!taxels[i] || col < begin || col >= end) continue;
