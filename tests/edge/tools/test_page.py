@@ -430,6 +430,8 @@ class TestInABrowser:
             comes(lambda: len(rows()) == 1)
             browser.find_element("css selector", "body").send_keys("1")
             comes(lambda: kept_page.labels == {"softness": "soft"})
+            chosen = "[aria-pressed=true][data-label=soft]"
+            comes(lambda: browser.find_elements("css selector", chosen))
             _, correct, _ = rows()[0].find_elements("css selector", "button")
             browser.execute_script("arguments[0].click()", correct)
             comes(lambda: labels() == {"softness": "soft"})
