@@ -121,6 +121,11 @@ class Evidence:
         """The evidence at one decision point."""
         return Evidence(*(values[point] for values in astuple(self)))
 
+    def beside(self, other: Evidence) -> Evidence:
+        """This evidence and another one (n,) together."""
+        pairs = zip(astuple(self), astuple(other), strict=True)
+        return Evidence(*map(np.concatenate, pairs))
+
 
 def _logistic(
     columns: Floats,
