@@ -1,5 +1,5 @@
-"""Tasks whose labels are made of two others' labels: a category is softness by
-mobility."""
+"""Labels of trials: those of a file made printable, and tasks whose labels are made of
+two others' labels, as a category is softness by mobility."""
 
 import logging
 from collections.abc import Mapping

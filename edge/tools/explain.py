@@ -135,8 +135,8 @@ class Explanation(NamedTuple):
     """
 
     voters: tuple[Near, ...]
-    rival: Near | None = None
-    pulls: dict[str, float] = {}  # noqa: RUF012
+    rival: Near | None
+    pulls: dict[str, float]
 
 
 def explain(
@@ -166,7 +166,7 @@ def explain(
     if truth == label or not other_rows.any():
         other_rows = ~answered & (space.labels >= 0)
     if not other_rows.any():
-        return Explanation(nearest)
+        return Explanation(nearest, None, {})
     ally = touch.nearest(answered)
     rival = touch.nearest(other_rows)
     pulls = touch.pulls(space.rows[ally] - space.rows[rival])

@@ -18,8 +18,8 @@ from edge.model.model import Model
 from edge.model.onnx_file import DIGITS
 
 UNMEASURED = (
-    "What it makes of each {} that it has not met is not known: too few were trained for "
-    "any to be left out."
+    "How it answers for an unseen {} is not known: too few were in training for one to "
+    "be held out."
 )
 
 

@@ -17,7 +17,7 @@ from edge.model.info import ModelInfo
 from edge.recording import load_arrays, load_meta
 from edge.saving import alone, save
 from edge.tools.record import Trials, recording, shared_meta
-from edge.tools.review import UNSURE, decisions_of
+from edge.tools.review import decisions_of, is_unsure
 from edge.touch.frame import Frame
 from edge.writing import check_writable
 
@@ -100,9 +100,9 @@ class Keeper:
         self._queue.put(None)
         self._thread.join()
         if self.written or self.lost:
-            kept = sum(path.exists() for path in self.written)
-            lost = f", {self.lost} lost" if self.lost else ""
-            LOG.info(f"{self._folder}: {counted(kept, 'recording')} kept{lost}")
+            count = sum(path.exists() for path in self.written)
+            losses = f", {self.lost} lost" if self.lost else ""
+            LOG.info(f"{self._folder}: {counted(count, 'recording')} kept{losses}")
 
     def _hand_over(self, frames: list[Frame]) -> None:
         first = frames[0].t
@@ -182,9 +182,8 @@ def reasons_of(decided: Sequence[Decided]) -> set[str]:
     """The reasons for which a touch with these decisions is worth keeping."""
     reasons = {"all"}
     for decision in decided:
-        sure = decision.confidence
         reasons.update(set(REASONS) & set(decision.flags))
-        if sure is None or sure < UNSURE:
+        if is_unsure(decision.confidence):
             reasons.add("unsure")
     return reasons
 

@@ -73,12 +73,11 @@ def run(arguments: argparse.Namespace) -> int:
     output = Output.of(arguments)
     if arguments.undo:
         return undo(arguments.data, output)
-    every = find(arguments.data)
-    words = arguments
-    changes = words.accept or words.set or words.unset or words.delete
+    paths = find(arguments.data)
+    changes = arguments.accept or arguments.set or arguments.unset or arguments.delete
     # Nobody else changes what is changed here, from its reading on.
-    with alone({path.parent for path in every} if changes else ()):
-        recordings = _chosen(output, every, words.only)
+    with alone({path.parent for path in paths} if changes else ()):
+        recordings = _chosen(output, paths, arguments.only)
         if not recordings:
             return 1
         if changes:
@@ -91,14 +90,14 @@ def _chosen(
     output: Output, paths: Sequence[Path], kinds: Sequence[str]
 ) -> list[tuple[Path, Recording]]:
     """The recordings that are of all kinds, with a message if there are none."""
-    chosen = []
+    recordings = []
     for path in paths:
         recording = load(path)
         if review.selected(recording.meta, kinds):
-            chosen.append((path, recording))
-    if not chosen:
+            recordings.append((path, recording))
+    if not recordings:
         output.text(f"none of {counted(len(paths), 'recording')} is of this kind")
-    return chosen
+    return recordings
 
 
 def _change(
@@ -121,15 +120,12 @@ def _change(
     if not changes:
         output.text(f"none of {counted(len(recordings), 'recording')} would change")
         return 0
+    number = counted(len(changes), "recording")
     if not arguments.yes:
-        recordings_text = counted(len(changes), "recording")
-        raise InputError(
-            f"{recordings_text} would change, as shown; add --yes to do it"
-        )
+        raise InputError(f"{number} would change, as shown; add --yes to do it")
     change_all(changes)
     if arguments.delete:
-        deleted = counted(len(changes), "recording")
-        output.text(f"{deleted} deleted; --undo brings them back")
+        output.text(f"{number} deleted; --undo brings them back")
     else:
         _print(output, [(path, load(path)) for path, _ in recordings])
     return 0
@@ -157,11 +153,11 @@ def undo(data: Sequence[str], output: Output) -> int:
         if not folder.is_dir():
             raise InputError(f"{folder}: --undo takes the folder of the recordings")
     with alone(folders):
-        brought = take_back(folders)
-    if not brought:
+        paths = take_back(folders)
+    if not paths:
         where = ", ".join(map(str, folders))
         raise InputError(f"{where}: there is no change to take back")
-    for path in brought:
+    for path in paths:
         output.text(f"{path}: is as it was before")
     return 0
 
@@ -174,8 +170,8 @@ def _decided_text(decided: Mapping[str, Mapping[str, Any]]) -> str:
     """The decisions of a kept touch, with their confidence and flags."""
     answers = []
     for task, answer in decided.items():
-        sure = answer["confidence"]
-        notes = [] if sure is None else [f"{sure:.0%}"]
+        confidence = answer["confidence"]
+        notes = [] if confidence is None else [f"{confidence:.0%}"]
         notes += answer["flags"]
         answers.append(f"{task}={answer['label']} {', '.join(notes)}".strip())
     return "; ".join(answers)

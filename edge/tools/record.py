@@ -35,7 +35,6 @@ from edge.output.event_writer import Lines
 from edge.recording import Recording
 from edge.saving import DELETED, save
 from edge.skin import file as skinfile
-from edge.skin.file import SkinFile
 from edge.skin.skin import Skin
 from edge.tools.review import decisions_of
 from edge.tools.trial_options import add_arm, open_arm, task_label
@@ -230,10 +229,13 @@ def run(arguments: argparse.Namespace) -> int:
         ) as live,
         closing(live.lines()) as lines,
     ):
+        from edge.fake.player import frame_rate  # counts the bits on a fake bus
+
+        wire_s = round(1.0 / frame_rate(live.skin.file), 6)
         recorder = Recorder(
             arguments.out,
             labels,
-            {**shared_meta(live.opened, arm), "wire_s": wire_s(live.skin.file)},
+            {**shared_meta(live.opened, arm), "wire_s": wire_s},
             _joint_names(arguments, live.opened, arm),
             lines,
             live.page,
@@ -334,13 +336,6 @@ def _joint_names(
     return None if opened.playback is None else opened.playback.recording.joint_names
 
 
-def wire_s(file: SkinFile) -> float:
-    """Seconds that a frame takes on the skin's wires."""
-    from edge.fake.player import frame_rate  # counts the bits on a fake bus
-
-    return round(1.0 / frame_rate(file), 6)
-
-
 def _status(arguments: argparse.Namespace, recorder: Recorder, skin: Skin) -> int:
     """The exit status, with a message where nothing was saved as it should be."""
     if not recorder.count:
@@ -360,7 +355,8 @@ class Recorder:
 
     Attributes:
         folder: of the trials.
-        labels: {task: label} of the next trial.
+        labels: {task: label} of the touch under way, which are those of its beginning,
+            or of the next one.
         meta: further metadata of every trial.
         names: the joints' names, or None if they are unknown.
         lines: where the `saved` events go.
@@ -368,7 +364,6 @@ class Recorder:
             None.
         paths: the trials saved so far.
         recording: whether the touch under way, or the next one, is to be saved.
-        held: the labels of the touch under way, which are those of its beginning.
         decided: the model's decisions about it.
         any_joints: whether a saved frame had joint angles.
     """
@@ -381,12 +376,8 @@ class Recorder:
     page: Page | None = None
     paths: list[Path] = field(default_factory=list)
     recording: bool = True
-    held: dict[str, str] = field(default_factory=dict)
     decided: list[Decided] = field(default_factory=list)
     any_joints: bool = False
-
-    def __post_init__(self) -> None:
-        self.held = self.labels
 
     @property
     def count(self) -> int:
@@ -402,7 +393,6 @@ class Recorder:
         if self.page is not None:
             self.labels = self.page.labels
             self.recording = self.page.recording
-        self.held = self.labels
 
     def save(self, frames: list[Frame] | None, *, complete: bool) -> None:
         """Save the frames of a trial, if there is one and it is to be saved."""
@@ -420,7 +410,7 @@ class Recorder:
 
     def _save(self, frames: list[Frame], complete: bool) -> None:
         """Save the frames of a trial under the next free name."""
-        meta = {**self.meta, "labels": self.held, "complete": complete}
+        meta = {**self.meta, "labels": self.labels, "complete": complete}
         first = frames[0].t
         decided = [event for event in self.decided if event.onset_s >= first]
         if decided:
@@ -432,7 +422,7 @@ class Recorder:
         if posed and self.names is not None:
             meta["joint_names"] = list(self.names)
         while True:
-            path = trial_path(self.folder, self.held)
+            path = trial_path(self.folder, self.labels)
             meta["trial"] = path.stem
             with suppress(NameTaken):  # another recorder in this folder was faster
                 save(path, trial, overwrite=False)
@@ -442,7 +432,7 @@ class Recorder:
         event = {
             "event": "saved",
             "file": str(path),
-            "labels": self.held,
+            "labels": self.labels,
             "frames": len(frames),
             "seconds": round(float(trial.t[-1]), 3),
             "joints": posed,

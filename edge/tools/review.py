@@ -66,6 +66,11 @@ def _is_decision(answer: Mapping[str, Any]) -> bool:
     )
 
 
+def is_unsure(confidence: float | None) -> bool:
+    """Whether a decision with this confidence is unsure."""
+    return confidence is None or confidence < UNSURE
+
+
 def kinds(meta: Mapping[str, Any]) -> list[str]:
     """The kinds of touches that a recording belongs to.
 
@@ -78,9 +83,8 @@ def kinds(meta: Mapping[str, Any]) -> list[str]:
     belongs = dict.fromkeys(KINDS, False)
     belongs["unlabelled"] = not labels or not labels.keys() >= decided.keys()
     for task, answer in decided.items():
-        sure = answer["confidence"]
-        unsure = sure is None or sure < UNSURE or UNKNOWN in answer["flags"]
-        belongs["unsure"] |= unsure
+        belongs["unsure"] |= is_unsure(answer["confidence"])
+        belongs["unsure"] |= UNKNOWN in answer["flags"]
         belongs["wrong"] |= labels.get(task, answer["label"]) != answer["label"]
     return [kind for kind in KINDS if belongs[kind]]
 

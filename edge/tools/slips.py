@@ -77,11 +77,11 @@ def _rare(thing: str, counts: Mapping[str, int], total: int) -> list[str]:
 
 def _meant(name: str, count: int, counts: Mapping[str, int]) -> str | None:
     """The more frequent name that one is probably a slip of."""
-    plain = _plain(name)
     if len(counts) > MOST_NAMES:  # too many to be compared with each other
         return None
+    plain = _plain(name)
+    share = FEW_SHARE if len(plain) > SHORT else RARE_SHARE
     for candidate, frequent in counts.items():
-        share = FEW_SHARE if len(plain) > SHORT else RARE_SHARE
         is_rare = count <= share * frequent
         if is_rare and candidate != name and _alike(plain, _plain(candidate)):
             return candidate

@@ -126,7 +126,7 @@ class WebServer:
             self._listener.close()
             raise
         self.server_port: int = self._listener.getsockname()[1]
-        name = _own_address() if host in ("0.0.0.0", "::") else host
+        name = _public_address() if host in ("0.0.0.0", "::") else host
         self._names = {name, "localhost", socket.gethostname()}
         name = f"[{name}]" if ":" in name else name
         self.token = secrets.token_urlsafe(16)
@@ -344,7 +344,7 @@ STREAM = _head(HTTPStatus.OK, {"Content-Type": "text/event-stream"})
 """Begins the answer that gets every new picture."""
 
 
-def _own_address() -> str:
+def _public_address() -> str:
     """The address at which other machines find this one; no packet is sent to learn
     it."""
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe, suppress(OSError):

@@ -19,7 +19,7 @@ EARLY_S = 0.3
 LONGEST_EARLY_S = 10.0
 """Seconds of first frames that are kept while what is set aside may be a touch."""
 LONG_S = 2.0
-"""No touch is longer, or than a second more than contacts are followed."""
+"""No touch is longer than this, or than a second more than contacts are followed."""
 FAR_LONGER = 4
 """What lasts so many times as long is set aside even where it is not still."""
 CHECK_S = 0.25
@@ -27,8 +27,8 @@ CHECK_S = 0.25
 MOVED_SHARE = 4
 """A touch adds more than the level of a taxel over this, and than the threshold."""
 FALL_SHARE = 8
-"""Part of it by which a level falls from look to look at most: who leans on the skin may
-sway."""
+"""From look to look, a level falls by at most the level over this: who leans on the skin
+may sway."""
 STILL_SHARE = 0.05
 """Part of its count by which a still taxel may change; noise may change it by half of
 the threshold."""
@@ -44,7 +44,7 @@ RESTLESS_LOOKS = 4
 LONE_LOOKS = 4
 """A taxel that lasts is named after so many looks in a small region."""
 LONGER_LOOKS = 2
-"""And so many looks later than it may be set aside, as it may be a touch all the same."""
+"""And so many looks later than it may be set aside, as it may be a touch after all."""
 QUIET_LOOKS = 40
 """A broken taxel is followed again after so many looks without contact: ten seconds, as
 one that wanders comes back."""
@@ -56,7 +56,8 @@ class AsideTaxels:
     What is above the threshold in the first frame is set aside at once: it may be a
     stuck taxel, or a touch under way, which changes. Later what has been in contact for
     longer than a touch lasts is set aside where it is still, where it lasts far longer,
-    or where a contact begins beside it. A taxel that is restless, alone or with few, is broken.
+    or where a contact begins beside it. A taxel that is restless, alone or with few, is
+    broken.
 
     Of a taxel that is set aside the level is subtracted, so that a touch on what leans
     there is felt. The level follows the highest count from look to look, and is gone
@@ -93,9 +94,8 @@ class AsideTaxels:
         self._began_s = frame.t if is_first else -math.inf
         self._early: list[tuple[Frame, ActiveTaxels]] = []
         """The first frames, while what is set aside may turn out to be a touch."""
-        self._levels = zeros.copy()
-        if is_first:
-            np.copyto(self._levels, frame.counts, where=begun_s == frame.t)
+        at_rest = is_first & (begun_s == frame.t)
+        self._levels: Integers = np.where(at_rest, frame.counts, zeros)
         """The counts at rest of taxels that are set aside; 0 of all others."""
         self._broken = self.aside
         self._hidden = self.aside

@@ -185,8 +185,8 @@ class ContactTracker:
             return
         contact.frames += 1
         # A reading without contact replaces none of its instant.
-        counts = region is not None or age_s > contact.age_s
-        if counts and (not confirmed or contact.age_s < self.horizon_s):
+        adds = region is not None or age_s > contact.age_s
+        if adds and (not confirmed or contact.age_s < self.horizon_s):
             contact.add(frame, active, region, age_s)
         if region is not None:
             contact.touched_s = age_s

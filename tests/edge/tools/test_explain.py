@@ -114,7 +114,7 @@ def test_a_task_is_explained_by_its_own_columns_and_trials_at_the_full_window(
 def test_without_another_label_there_is_no_rival():
     why = by_hand(BY_HAND._replace(labels=np.array([0, 0])), voters=[1])
     pulls = {"force": -6.0, "area": 0.0}
-    assert why == Explanation((Near(1, 0, np.sqrt(12.5), pulls),))
+    assert why == Explanation((Near(1, 0, np.sqrt(12.5), pulls),), None, {})
 
 
 @pytest.mark.parametrize("name", ["golden", "exported"])

@@ -32,7 +32,7 @@ def test_the_doubt_about_names_says_what_it_is_worth():
     )
     unmeasured = replace(stopping.remoteness, worth={})
     (sentence,) = doubt({"object": replace(stopping, remoteness=unmeasured)})
-    assert "is not known: too few were trained" in sentence
+    assert "an unseen object is not known: too few were in training" in sentence
 
 
 def test_a_person_gets_sentences(edge, monkeypatch):
