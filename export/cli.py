@@ -137,7 +137,7 @@ def _add_choice(top: argparse.ArgumentParser) -> None:
         help="calibrate decisions before the full window (edge-classify run --error), at these "
         "seconds from onset, or at a list a,b,c, or `none` (default: "
         f"{DECISION_POINTS} with {FEWEST} to {MOST_TRIALS} trials, and fewer points if "
-        "the model would exceed 1 MB)",
+        "the model would exceed 1.9 MB)",
     )
     counts = within(int, 0, 65534)
     option("--threshold", type=counts, help="counts above which a taxel is in contact")

@@ -12,6 +12,8 @@ THROUGH = {
     "train/report/work.py": "train/study/test_study_report.py",
     "train/importers/rosbag.py": "train/importers/test_log_importers.py",
     "train/importers/topics.py": "train/importers/test_log_importers.py",
+    "train/simulate/families.py": "train/simulate/test_simulate_scene.py",
+    "train/simulate/groups.py": "train/simulate/test_effects.py",
     "train/simulate/truth.py": "train/simulate/test_simulate_truth.py",
 }
 """{module or folder: the test file that specifies it with others}."""

@@ -118,8 +118,7 @@ class Choosing:
         """The candidates' answers to left-out trials, and to left-out groups where
         there are any, each of the tasks that are chosen by them.
 
-        Without groups, both are the answers to left-out trials. A candidate counts by
-        its mean over `several` windows; then none is dropped, and there is one division.
+        Without groups, both are the answers to left-out trials.
         """
         folds = self._divisions.folds
         further_folds = self._divisions.further
@@ -296,7 +295,7 @@ class Choosing:
         untouched = self._dataset.untouched_labels(task)
         groups = protocol.count(self._y[task])
         promise = partial(promised, untouched=untouched, groups=groups)
-        own_choices = [
+        of_candidates = [
             protocol.of_candidate(task, candidate) for candidate in self.candidates
         ]
         accuracy = promise(protocol.accuracy(task))
@@ -311,8 +310,8 @@ class Choosing:
             accuracy=accuracy,
             by_trial=by_trial,
             left_out=protocol.name,
-            candidates=tuple(own and promise(own[0]) for own in own_choices),
-            picks=tuple(own and own[1] for own in own_choices),
+            candidates=tuple(best and promise(best[0]) for best in of_candidates),
+            picks=tuple(best and best[1] for best in of_candidates),
             folds=protocol.folds,
         )
         return chosen, without
@@ -323,7 +322,8 @@ def _unseen(groups: Groups, grids: Sequence[SearchGrid]) -> list[SearchGrid]:
     discriminants of these groups among others."""
     unseen = []
     for grid in grids:
-        least, most = UNSEEN_SHRINKAGE, np.inf
+        least = UNSEEN_SHRINKAGE
+        most = np.inf
         if groups.name in grid.targets:
             least, most = TOGETHER_SHRINKAGES
         enough = tuple(s for s in grid.shrinkages if least <= s <= most)
@@ -371,11 +371,11 @@ def decided_together(
     together = {}
     for task, settings in chosen.items():
         together[task] = _planned(settings, plans, (task,))
-    joined = families(vectors.y)
+    task_families = families(vectors.y)
     for task, settings in chosen.items():
-        if settings.left_out != TRIAL and not any(task in f for f in joined):
-            joined.append((task,))
-    for family in joined:
+        if settings.left_out != TRIAL and not any(task in f for f in task_families):
+            task_families.append((task,))
+    for family in task_families:
         right = {}
         for left_out in {TRIAL, *(chosen[task].left_out for task in family)}:
             right[left_out] = _right_together(family, vectors, plans[left_out], jobs)

@@ -214,12 +214,12 @@ def rest_of(trials: Sequence[Samples], options: ValueOptions) -> Rest:
     return Rest(values, scale=scale)
 
 
-def _say_missing(trials: Sequence[Samples], code: float | None) -> None:
+def _say_missing(trials: Sequence[Samples], stand_in: float | None) -> None:
     """Take away the values that stand for missing ones, and say how many are missing,
     and which others stand alone as such values do."""
     missing = 0
     for trial in trials:
-        trial.values[trial.values == code] = math.nan
+        trial.values[trial.values == stand_in] = math.nan
         missing += int(trial.missing.sum())
     if missing:
         say(

@@ -68,12 +68,12 @@ class Curve:
         margins: Floats,
         excess: Floats,
         share: float,
-        known: Floats | float = 1.0,
+        known: Floats,
     ) -> Curve:
         """The curve with the intercept at which the mean probability is `share`, each
         times that of `known`."""
         half_a_trial = 0.5 / margins.size
-        most = float(np.mean(known)) - half_a_trial
+        most = float(known.mean()) - half_a_trial
         target = min(max(share, half_a_trial), most)
 
         def surplus(shift: float) -> float:
@@ -170,6 +170,8 @@ def cross_fitted(
         left_out = folds == fold
         outside = tested & ~left_out
         curve = Curve.of(margins[:, outside], excess[:, outside], right[:, outside])
-        evidence = margins[:, left_out], excess[:, left_out]
-        confidences[:, left_out] = curve.probabilities(*evidence)
+        confidences[:, left_out] = curve.probabilities(
+            margins[:, left_out],
+            excess[:, left_out],
+        )
     return confidences

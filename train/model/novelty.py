@@ -150,20 +150,15 @@ class NoveltySpace:
         pairs = map(self._scores, self.points, X)
         return Scores(*map(np.stack, zip(*pairs, strict=True)))
 
-    def coordinates(self, point: int, x: Floats) -> Floats:
-        """(m, components) whole coordinates of vectors (m, p) at a decision point."""
-        constants = self.points[point]
-        steps = _steps(x, constants.mean, constants.gain)
-        return _coordinates(_product(steps, self.weights, self.shift), constants)
-
     def _scores(self, point: NoveltyPoint, x: Floats) -> tuple[Floats, Floats]:
         steps = _steps(x, point.mean, point.gain)
         z = _product(steps, self.weights, self.shift)
         outside = np.maximum((steps**2).sum(axis=1) - (z**2).sum(axis=1), 1.0)
         y = _coordinates(z, point)
         nearest = np.sqrt(cdist(y, point.rows, "sqeuclidean").min(axis=1))
-        weighted = y * point.weights, point.rows * point.weights
-        squares = cdist(*weighted, "sqeuclidean") * point.nearness
+        weighted = y * point.weights
+        rows = point.rows * point.weights
+        squares = cdist(weighted, rows, "sqeuclidean") * point.nearness
         return np.sqrt(outside) * nearest * point.unit, np.sqrt(squares.min(axis=1))
 
 

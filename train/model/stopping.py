@@ -251,8 +251,13 @@ class SequentialClassifier:
         self._things = thing_folds(np.where(folds >= 0, labels, ""))
         left_out = None
         if self._things is not None:
-            of_vectors = vectors.X, labels, self._things, vectors.columns
-            self._left_out = held_out_scores(*of_vectors, self.jobs)
+            self._left_out = held_out_scores(
+                vectors.X,
+                labels,
+                self._things,
+                vectors.columns,
+                self.jobs,
+            )
             left_out = self._left_out.part(self._things >= 0).remoteness
         self._bare = remoteness_of(tested.remoteness, left_out)
         self._known = known_of(self._bare, scores.remoteness)
@@ -301,8 +306,13 @@ class SequentialClassifier:
         """{task: its rules}, by answers whose settings were chosen without the fold."""
         scores = {}
         for task, right in answered.right.items():
-            evidence = answered.margins[task], self._excess, right
-            scores[task] = cross_fitted(*evidence, self._folds, self._tested[task])
+            scores[task] = cross_fitted(
+                answered.margins[task],
+                self._excess,
+                right,
+                self._folds,
+                self._tested[task],
+            )
         doubts = self.unusual_, self.unknown_
         courses = self._courses(scores, answered.right, doubts, self._tested)
         seconds = np.array(self.decision_points_s)
@@ -338,12 +348,14 @@ class SequentialClassifier:
                 np.ones((len(self.decision_points_s), int(tests.sum()))),
             )
             together = evidence.curve()
+            early = together
             if task == self._name:
                 evidence = replace(evidence, known=self._known[:, tests])
+                early = evidence.curve()
             at_end = evidence.at(-1)
             if task in never_met:
                 at_end = at_end.beside(never_met[task])
-            before = [evidence.curve()] * (len(self.decision_points_s) - 1)
+            before = [early] * (len(self.decision_points_s) - 1)
             curves = [*before, at_end.curve()]
             slopes, intercepts, doubts = zip(*map(astuple, curves), strict=True)
             stopping[task] = Stopping(

@@ -202,9 +202,9 @@ def resolution(context: Context) -> Section:
     cases = [(*skin, data.chain, labels) for skin in skins]
     answers = context.workers.map("taxel resolution", _with_skin, cases)
     taxels = [layout.rows * layout.cols for layout, _ in skins]
-    accuracies, missed = zip(*answers, strict=True)
+    accuracies, counts = zip(*answers, strict=True)
     results = dict(zip(taxels, accuracies, strict=True))
-    without_contact = dict(zip(taxels, missed, strict=True))
+    without_contact = dict(zip(taxels, counts, strict=True))
     title = "Effect of taxel resolution (Table I, Fig. 9)"
     png = figures.lines(
         "resolution",

@@ -73,7 +73,7 @@ def test_the_mean_probability_is_moved_to_a_share(share):
     rng = np.random.default_rng(4)
     margins = rng.normal(size=200)
     excess = rng.exponential(size=200)
-    curve = Curve(2.0, 0.5, 1.0).with_mean(margins, excess, share)
+    curve = Curve(2.0, 0.5, 1.0).with_mean(margins, excess, share, np.ones(200))
     assert curve.slope == 2.0
     assert curve.doubt == 1.0
     expected = min(max(share, 0.5 / 200), 1.0 - 0.5 / 200)
