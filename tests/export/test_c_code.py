@@ -91,7 +91,7 @@ def recordings_for(layout, count, rng):
     return recordings
 
 
-def check(model, folder, recordings, vectors=(), error=None, board=None):
+def assert_same(model, folder, recordings, vectors=(), error=None, board=None):
     """Ask C about vectors and recordings, and compare every bit with Python's answer."""
     c_code.write(model, folder, error)
     command = machine.compiled(folder, board)
@@ -153,7 +153,9 @@ def test_the_demo_has_the_same_bits(tmp_path):
     touches += [damaged(recording, rng) for recording in touches * 3]
     golden = np.load(Path(__file__).parents[1] / "golden" / "demo.npz")["vectors"]
     near = np.nextafter(golden[:20], np.inf)
-    check(model, tmp_path, touches, [*golden, *near, *hostile(model.info.width, rng)])
+    assert_same(
+        model, tmp_path, touches, [*golden, *near, *hostile(model.info.width, rng)]
+    )
 
 
 @pytest.mark.slow
@@ -163,7 +165,7 @@ def test_early_decisions_have_the_same_bits(early, tmp_path):
     vectors = hostile(model.info.width, np.random.default_rng(2))
     errors = {s.rules[i].error for s in model.info.stopping.values() for i in (0, -1)}
     for i, error in enumerate([None, *sorted(errors)]):
-        check(model, tmp_path / str(i), touches, vectors, error)
+        assert_same(model, tmp_path / str(i), touches, vectors, error)
 
 
 @pytest.mark.slow
@@ -191,7 +193,7 @@ def test_a_microcontroller_has_the_same_bits(early, tmp_path, board):
     model, touches = early
     error = max(s.rules[-1].error for s in model.info.stopping.values())
     vectors = hostile(model.info.width, np.random.default_rng(3))
-    check(model, tmp_path, touches[::3], vectors, error, board)
+    assert_same(model, tmp_path, touches[::3], vectors, error, board)
 
 
 RANDOM = [
@@ -216,7 +218,7 @@ def test_a_random_models_graph_has_the_same_bits(
     path = tmp_path / "model.onnx"
     path.write_bytes(to_onnx(fit(X, choices), describe(fit(X, choices), samples=8)))
     vectors = [*queries, *hostile(X.shape[1], np.random.default_rng(6))]
-    check(Model(path), tmp_path / "c", [], vectors)
+    assert_same(Model(path), tmp_path / "c", [], vectors)
 
 
 SKINS = [

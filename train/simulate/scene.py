@@ -11,8 +11,8 @@ from edge.config import REQUIRED, ConfigTable, read_toml
 from edge.errors import InputError
 from edge.recording import LARGEST_BYTES
 from edge.skin.file import shipped
-from edge.tools.trial_options import read_arm
 from edge.touch.arm import Chain
+from edge.touch.arm_file import read_arm
 from train.simulate import schema
 from train.simulate.families import draw_family
 from train.simulate.plan import check_supported

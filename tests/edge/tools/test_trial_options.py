@@ -6,8 +6,6 @@ import numpy as np
 import pytest
 
 from edge import recording, saving
-from edge.errors import InputError
-from edge.tools.trial_options import read_arm
 from edge.touch.arm import Chain
 
 
@@ -67,17 +65,3 @@ def test_an_arm_that_cannot_be_used_is_refused(files, record, options, sentence)
     assert status == 2
     assert sentence in err
     assert list(files.glob("out/*")) == []
-
-
-def test_a_urdf_is_read_between_two_links(urdf):
-    assert read_arm(urdf, "base", "tool").dof == 3
-
-
-def test_a_urdf_without_its_links_is_refused(urdf):
-    with pytest.raises(InputError, match="a URDF needs --base and --tip"):
-        read_arm(urdf)
-
-
-def test_links_are_for_a_urdf_alone():
-    with pytest.raises(InputError, match="--base and --tip are for a .urdf file"):
-        read_arm("arm.toml", "base", "tool")
