@@ -22,6 +22,9 @@ def test_a_folder_that_cannot_be_written_is_named_before_any_work(tmp_path, caps
     assert main(["--data", str(tmp_path / "missing"), "--out", str(out)]) == 2
     sentence = f"export: {out}: cannot be written: File exists\n"
     assert capsys.readouterr().err == sentence
+    words = ["--data", "missing", "--out", str(tmp_path), "--c", str(out)]
+    assert main(words) == 2
+    assert capsys.readouterr().err == sentence
 
 
 @pytest.fixture(scope="module")
@@ -156,6 +159,7 @@ def test_decision_points_before_a_window_hold_it_fixed(
         ("--window", "0", "must be a number from 0.01 to 60"),
         ("--scaling", "VI", "invalid choice: 'VI'"),
         ("--threshold", "-3", "must be a whole number from 0 to 65534"),
+        ("--c-error", "nan", "must be a number from 1e-06 to 0.999999"),
     ],
 )
 def test_a_number_outside_its_range_is_refused(option, value, sentence, capsys):
@@ -217,6 +221,7 @@ def test_a_former_model_in_the_same_place_is_compared_as_it_was(
         (["--test", "missing"], "missing: cannot be read: No such file or directory"),
         (["--test", "x.npz", "--compare", "old.onnx"], "old.onnx: no such model"),
         (["--compare", "old.onnx"], "--compare needs --test"),
+        (["--flash", "512"], "--c-error and --flash need --c"),
     ],
 )
 def test_held_out_recordings_and_a_former_model_are_checked_before_any_work(

@@ -84,6 +84,15 @@ def test_without_a_former_model_there_is_no_way_back(edge, running):
     assert "has no former model to go back to" in err
 
 
+def test_a_model_that_cannot_be_placed_leaves_no_golden_file(edge, new, tmp_path):
+    folder = tmp_path / "model.onnx"
+    folder.mkdir()
+    status, _, err = edge("install", new, "--to", folder)
+    assert status == 2
+    assert f"{folder}: cannot be written: it is not a regular file" in err
+    assert not list(tmp_path.glob("golden-*"))
+
+
 STEPS = (install, "_write"), (Path, "replace")
 
 
