@@ -68,6 +68,9 @@ def run(arguments: argparse.Namespace) -> int:
     remove_leftovers(target.parent)
     finish(target)
     if arguments.back:
+        former = beside(target, FORMER)
+        if former.is_file():
+            Model(former)  # a damaged one must not take a working one's place
         go_back(target)
         restart(arguments.service)
         model = Model(target)
