@@ -212,13 +212,7 @@ def _add_c(top: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Fit, write and report."""
-    if arguments.compare and not arguments.test:
-        raise InputError(
-            "--compare needs --test: only recordings that neither model was fitted on "
-            "tell which is better"
-        )
-    if (arguments.c_error or arguments.flash) and not arguments.c:
-        raise InputError("--c-error and --flash need --c DIR")
+    _check_options(arguments)
     # What may fail does so before the work, which may take an hour.
     for folder in filter(None, (arguments.out, arguments.c)):
         check_writable(folder)
@@ -259,6 +253,17 @@ def _written(
     if held_out:
         print(held_out_text(Model(path), former, held_out), file=sys.stderr)
     return 0
+
+
+def _check_options(arguments: argparse.Namespace) -> None:
+    """Refuse options without those that they belong to."""
+    if arguments.compare and not arguments.test:
+        raise InputError(
+            "--compare needs --test: only recordings that neither model was fitted on "
+            "tell which is better"
+        )
+    if (arguments.c_error or arguments.flash) and not arguments.c:
+        raise InputError("--c-error and --flash need --c DIR")
 
 
 def _check_apart(data: list[str], held_out: Sequence[Path]) -> None:

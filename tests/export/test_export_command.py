@@ -6,10 +6,14 @@ from contextlib import redirect_stderr
 from types import SimpleNamespace
 from unittest.mock import Mock
 
+import numpy as np
 import pytest
 
+from edge import demo
 from edge.errors import InputError
 from edge.model.model import Model
+from edge.recording import Recording
+from edge.saving import save
 from edge.statistics import wilson
 from export.__main__ import main
 from export.cli import held_out_text
@@ -234,3 +238,15 @@ def test_held_out_recordings_and_a_former_model_are_checked_before_any_work(
     monkeypatch.setattr("export.cli.fit", Mock(side_effect=AssertionError("fitted")))
     assert main(["--data", "data", "--out", str(tmp_path), *words]) == 2
     assert sentence in capsys.readouterr().err
+
+
+def test_a_former_model_that_needs_joints_is_refused_before_any_work(
+    recordings, tmp_path, capsys, monkeypatch
+):
+    monkeypatch.setattr("export.cli.fit", Mock(side_effect=AssertionError("fitted")))
+    touch = tmp_path / "touch.npz"
+    still = np.zeros((2, 16, 24), np.uint16)
+    save(touch, Recording(np.array([0.0, 0.1]), still), lasting=False)
+    words = ["--test", str(touch), "--compare", str(demo.MODEL)]
+    assert main(["--data", str(recordings), "--out", str(tmp_path), *words]) == 2
+    assert f"{touch}: has no joint angles" in capsys.readouterr().err
