@@ -216,7 +216,9 @@ def _noted(note: Path) -> Change:
     text = read_text(note)
     with parsing(str(note), "a change of labels", "; delete it"):
         change = Change(**json.loads(text))
-        labels = {Path(file).name: (a, b) for file, (a, b) in change.labels.items()}
+        labels = {}
+        for file, (before, after) in change.labels.items():
+            labels[Path(file).name] = before and dict(before), after and dict(after)
     return replace(change, labels=labels)
 
 

@@ -96,9 +96,10 @@ def test_a_change_that_was_finished_later_can_be_taken_back(new_days, caplog):
     assert list(days[0].parent.rglob(".*")) == []
 
 
-def test_a_note_that_is_cut_may_be_deleted(new_days):
+@pytest.mark.parametrize("text", ['{"labels"', '{"labels": {"a.npz": [NaN, {}]}}'])
+def test_a_damaged_note_may_be_deleted(new_days, text):
     day, _ = new_days()
-    (day / JOURNAL).write_text('{"labels"')
+    (day / JOURNAL).write_text(text)
     with pytest.raises(InputError, match="not a change of labels: .*; delete it"):
         find([str(day)])
 
