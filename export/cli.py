@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import os
 import sys
 from collections.abc import Sequence
 from pathlib import Path
@@ -274,9 +275,10 @@ def _check_apart(data: list[str], held_out: Sequence[Path]) -> None:
     """
     if not held_out:
         return
-    fitted = {file.resolve() for file in find(data)}
+    # Unlike Path.resolve, this raises nothing for a link to itself.
+    fitted = set(map(os.path.realpath, find(data)))
     for file in held_out:
-        if file.resolve() in fitted:
+        if os.path.realpath(file) in fitted:
             raise InputError(
                 f"{file}: is in --data and in --test; what is scored must not be fitted: "
                 "move it out of the folder of --data"

@@ -3,6 +3,7 @@
 import io
 import shutil
 from contextlib import redirect_stderr
+from pathlib import Path
 from types import SimpleNamespace
 from unittest.mock import Mock
 
@@ -223,6 +224,7 @@ def test_a_former_model_in_the_same_place_is_compared_as_it_was(
     ("words", "sentence"),
     [
         (["--test", "missing"], "missing: cannot be read: No such file or directory"),
+        (["--test", "loop"], "loop: cannot be read: Too many levels of symbolic links"),
         (["--test", "x.npz", "--compare", "old.onnx"], "old.onnx: no such model"),
         (["--compare", "old.onnx"], "--compare needs --test"),
         (["--flash", "512"], "--c-error and --flash need --c"),
@@ -236,6 +238,8 @@ def test_held_out_recordings_and_a_former_model_are_checked_before_any_work(
     monkeypatch,
 ):
     monkeypatch.setattr("export.cli.fit", Mock(side_effect=AssertionError("fitted")))
+    monkeypatch.chdir(tmp_path)
+    Path("loop").symlink_to("loop")
     assert main(["--data", "data", "--out", str(tmp_path), *words]) == 2
     assert sentence in capsys.readouterr().err
 
