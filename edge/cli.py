@@ -135,9 +135,13 @@ def _status(program: str, arguments: argparse.Namespace) -> int:
         _discard_output()  # the reader of the output has closed the pipe
         return 0
     except OSError as error:
-        # An error of a file has a name, or `edge.files` has reported it: this one is of
-        # stdout.
-        if error.filename is not None or error.errno not in UNWRITABLE:
+        # Even to ask whether a file exists fails in a folder that is closed to the user.
+        # An error without a file's name is of stdout, as `edge.files` reports the others.
+        if error.filename is not None:
+            problem = f"{error.filename}: cannot be used: {error.strerror}"
+            print(f"{program}: {InputError(problem)}", file=sys.stderr)
+            return 2
+        if error.errno not in UNWRITABLE:
             raise
         _discard_output()
         problem = f"standard output cannot be written: {error.strerror}"

@@ -21,6 +21,8 @@ from edge.model.info import (
 from edge.model.model import Decision, Model
 
 LOG = logging.getLogger(__name__)
+LEAST_ERROR = 1e-6
+"""The trials that certify less are beyond all recording, in the end beyond counting."""
 TEST_SHARE = 0.5
 """Part of the risk that the tests on calibration trials take. The rest covers the
 exported model, which errs more or less often than the folds' models do on average."""
@@ -198,11 +200,13 @@ def stopping_rules(model: Model, error: float) -> dict[str, StoppingRule | None]
     """{task: the fastest stopping rule that is certified for an error rate, or None}.
 
     Raises:
-        InputError: the rate is outside (0, 1), or is certified for no task; the message
-            names the errors that are.
+        InputError: the rate is below `LEAST_ERROR` or not below 1, or is certified for
+            no task; the message names the errors that are.
     """
-    if not 0.0 < error < 1.0:
-        raise InputError(f"the error rate must be above 0 and below 1, not {error:g}")
+    if not LEAST_ERROR <= error < 1.0:
+        raise InputError(
+            f"the error rate must be at least {LEAST_ERROR:g} and below 1, not {error:g}"
+        )
     if not model.info.decision_points_s:
         raise InputError(
             f"{model.path}: the model has no calibration, so no error rate can be "

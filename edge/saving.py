@@ -19,7 +19,6 @@ from typing import Any
 import numpy as np
 
 from edge.arrays import Array
-from edge.config import parse_json
 from edge.errors import InputError, about
 from edge.files import parsing, read_text, refusing
 from edge.labels import Labels
@@ -214,10 +213,12 @@ def _noted(note: Path) -> Change:
     """
     if not note.is_file():
         return Change()
-    entries = parse_json(read_text(note), str(note))
+    text = read_text(note)
     with parsing(str(note), "a change of labels", "; delete it"):
-        change = Change(**entries)
-        labels = {Path(file).name: (a, b) for file, (a, b) in change.labels.items()}
+        change = Change(**json.loads(text))
+        labels = {}
+        for file, (before, after) in change.labels.items():
+            labels[Path(file).name] = before and dict(before), after and dict(after)
     return replace(change, labels=labels)
 
 
@@ -234,6 +235,7 @@ def _finish(folder: Path) -> list[Path]:
         if not source.is_file():
             continue
         if before is None or after is None:
+            goal.parent.mkdir(exist_ok=True)
             source.rename(goal)
             changed.append(path)
             continue

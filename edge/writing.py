@@ -93,7 +93,7 @@ def _sync_folder(folder: Path) -> None:
 
 def _check_target(target: Path) -> None:
     """Refuse an impossible name, and the name of a folder, a FIFO or a device."""
-    if "\0" in target.name:
+    if "\0" in os.fspath(target):
         raise InputError(
             f"{target}: a file's name cannot hold a null character; choose another"
         )

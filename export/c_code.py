@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 import os
-import shutil
 import string
 from collections.abc import Iterable, Mapping, Sequence
 from itertools import pairwise
@@ -26,6 +25,7 @@ from edge.touch.feature import Feature
 from edge.touch.kernels import BIASES, KernelTable, mixes
 from edge.touch.layout import SkinLayout
 from edge.touch.zones import Zones
+from edge.writing import write_whole
 from export.c_graph import TYPES, CompiledGraph
 
 ROOMS = Path(__file__).parent / "c"
@@ -64,9 +64,18 @@ def write(
         What was written, with its size.
 
     Raises:
-        InputError: C lacks something that the model needs, or the error rate is not
-            certified.
+        InputError: C lacks something that the model needs, the error rate is not
+            certified, or the folder cannot be written.
     """
+    source = source_of(model, error, frames)
+    source.write(folder)
+    return source
+
+
+def source_of(
+    model: Model, error: float | None = None, frames: int | None = None
+) -> Source:
+    """A model's C, as `write` writes it."""
     for reason in lacks(model.info):
         raise InputError(f"{model.path}: cannot be written in C, as {reason}")
     last = len(model.decision_points_s) - 1
@@ -83,15 +92,6 @@ def write(
     windows_s = [model.decision_points_s[point] for point in points]
     source.constant("double ec_windows_s[]", windows_s)
     source.define(POINTS=len(points), EARLY=error is not None)
-    target = Path(folder)
-    target.mkdir(parents=True, exist_ok=True)
-    for file in ROOMS.iterdir():
-        shutil.copy(file, target)
-    defines = "\n".join(source.defines)
-    header = f"#ifndef EC_MODEL_H\n#define EC_MODEL_H\n{defines}\n#endif\n"
-    (target / "model.h").write_text(header)
-    constants = "\n".join(source.constants)
-    (target / "model.c").write_text(f'#include "internal.h"\n\n{constants}\n')
     return source
 
 
@@ -113,16 +113,17 @@ def export(
         InputError: as `write`; or it is larger even without early decisions.
     """
     left_out = ""
-    source = write(model, folder, error)
+    source = source_of(model, error)
     limit = 1024 * flash_kb if flash_kb else source.flash
     if source.flash > limit and error is not None:
         left_out = "; early decisions are left out to fit --flash"
-        source = write(model, folder, None)
+        source = source_of(model)
     if source.flash > limit:
         raise InputError(
             f"{model.path}: takes {source.flash / 1024:.0f} kB of flash in C, above "
             "--flash; export fewer features or recordings"
         )
+    source.write(folder)
     millions = source.work / 1e6
     return (
         f"{os.fspath(folder)}: {source.flash / 1024:.0f} kB of flash, "
@@ -155,6 +156,18 @@ class Source:
         self._types = feature_types(info.features)
         self._points = points
         self._frames = frames
+
+    def write(self, folder: str | os.PathLike[str]) -> None:
+        """Write all files, each whole or not at all."""
+        defines = "\n".join(self.defines)
+        constants = "\n".join(self.constants)
+        header = f"#ifndef EC_MODEL_H\n#define EC_MODEL_H\n{defines}\n#endif\n"
+        texts = {file.name: file.read_text() for file in ROOMS.iterdir()}
+        texts["model.h"] = header
+        texts["model.c"] = f'#include "internal.h"\n\n{constants}\n'
+        for name, text in texts.items():
+            with write_whole(Path(folder) / name) as file:
+                file.write(text.encode())
 
     def define(self, **values: object) -> None:
         """Constants of the preprocessor."""

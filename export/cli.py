@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import argparse
+import os
 import sys
 from collections.abc import Sequence
 from pathlib import Path
 
 from joblib import cpu_count
 
+from edge.classifier import suited
 from edge.cli import dispatch
 from edge.commands.options import within
 from edge.errors import InputError
@@ -197,7 +199,7 @@ def _add_c(top: argparse.ArgumentParser) -> None:
     )
     option(
         "--c-error",
-        type=float,
+        type=within(float, 1e-6, 1.0 - 1e-6),
         metavar="RATE",
         help="with --c: decide early, wrongly at most this often (default: at the full window)",
     )
@@ -211,18 +213,17 @@ def _add_c(top: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Fit, write and report."""
-    if arguments.compare and not arguments.test:
-        raise InputError(
-            "--compare needs --test: only recordings that neither model was fitted on "
-            "tell which is better"
-        )
+    _check_options(arguments)
     # What may fail does so before the work, which may take an hour.
-    check_writable(arguments.out)
+    for folder in filter(None, (arguments.out, arguments.c)):
+        check_writable(folder)
     former = Model(arguments.compare) if arguments.compare else None
     held_out = find(arguments.test or [])
     _check_apart(arguments.data, held_out)
     for file in held_out:
-        load(file)
+        recording = load(file)
+        if former is not None:
+            suited(former, recording, str(file))
     with single_thread():
         fitted = _fit(arguments)
         return _written(arguments, fitted, former, held_out)
@@ -242,17 +243,28 @@ def _written(
     print("\n".join(counts_text(labels)), end="\n\n", file=sys.stderr)
     print(summary(fitted, prices), file=sys.stderr)
     print(f"{path} ({size / 1024:.0f} kB)\n{path.with_name('golden.npz')}")
+    if arguments.report:
+        from train.report.model_report import write  # loads matplotlib
+
+        print(write(arguments.out, fitted, Model(path), prices, arguments.jobs))
     if arguments.c:
         from export.c_code import export
 
         print(export(Model(path), arguments.c, arguments.c_error, arguments.flash))
     if held_out:
         print(held_out_text(Model(path), former, held_out), file=sys.stderr)
-    if arguments.report:
-        from train.report.model_report import write  # loads matplotlib
-
-        print(write(arguments.out, fitted, Model(path), prices, arguments.jobs))
     return 0
+
+
+def _check_options(arguments: argparse.Namespace) -> None:
+    """Refuse options without those that they belong to."""
+    if arguments.compare and not arguments.test:
+        raise InputError(
+            "--compare needs --test: only recordings that neither model was fitted on "
+            "tell which is better"
+        )
+    if (arguments.c_error or arguments.flash) and not arguments.c:
+        raise InputError("--c-error and --flash need --c DIR")
 
 
 def _check_apart(data: list[str], held_out: Sequence[Path]) -> None:
@@ -263,9 +275,10 @@ def _check_apart(data: list[str], held_out: Sequence[Path]) -> None:
     """
     if not held_out:
         return
-    fitted = {file.resolve() for file in find(data)}
+    # Unlike Path.resolve, this raises nothing for a link to itself.
+    fitted = set(map(os.path.realpath, find(data)))
     for file in held_out:
-        if file.resolve() in fitted:
+        if os.path.realpath(file) in fitted:
             raise InputError(
                 f"{file}: is in --data and in --test; what is scored must not be fitted: "
                 "move it out of the folder of --data"

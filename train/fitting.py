@@ -133,7 +133,7 @@ def fit(data: DataSet | str | Path | Sequence[str | Path], **options: Any) -> Fi
     doubts = [f"warning: probably a slip: {sentence}" for sentence in slips(labels)]
     if len(labels) < FEWEST_TRIALS:
         raise InputError(
-            f"{len(labels)} trials are too few to fit; record at least {FEWEST_TRIALS}"
+            f"a fit needs at least {FEWEST_TRIALS} trials, not {len(labels)}; record more"
         )
     settings = choose(loaded, y, fixed)
     measured = loaded.dataset.with_kernels(settings.window_s)

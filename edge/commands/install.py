@@ -68,6 +68,9 @@ def run(arguments: argparse.Namespace) -> int:
     remove_leftovers(target.parent)
     finish(target)
     if arguments.back:
+        former = beside(target, FORMER)
+        if former.is_file():
+            Model(former)  # a damaged one must not take a working one's place
         go_back(target)
         restart(arguments.service)
         model = Model(target)
@@ -129,8 +132,15 @@ def beside(target: Path, end: str) -> Path:
 def place(model: Path, golden: Path, target: Path) -> None:
     """Put the model and its golden file in place, and keep the model that runs."""
     data = read_bytes(model, LARGEST_BYTES)
-    _write(_golden_of(target, data), read_bytes(golden, LARGEST_BYTES))
-    _replace(target, data)
+    kept = _golden_of(target, data)
+    is_new = not kept.exists()
+    _write(kept, read_bytes(golden, LARGEST_BYTES))
+    try:
+        _replace(target, data)
+    except InputError:
+        if is_new:
+            kept.unlink()
+        raise
 
 
 def _golden_of(target: Path, data: bytes) -> Path:

@@ -112,7 +112,7 @@ def verify(model: Model, path: str | os.PathLike[str]) -> list[Check]:
         "; export it again with the model",
     ):
         SkinLayout.from_dict(meta["skin"], where=name)
-        lines = chain(_path(model, arrays, meta), _graph(model, name, arrays))
+        lines = chain(_path(model, name, arrays, meta), _graph(model, name, arrays))
         return list(starmap(compared, lines))
 
 
@@ -140,6 +140,7 @@ def _trials(arrays: dict[str, Array], meta: dict[str, Any]) -> Iterator[Recordin
 
 def _path(
     model: Model,
+    name: str,
     arrays: dict[str, Array],
     meta: dict[str, Any],
 ) -> Iterator[Line]:
@@ -150,7 +151,7 @@ def _path(
     integers = []
     vectors = []
     for i, trial in enumerate(_trials(arrays, meta)):
-        model.require_joints(trial.dof, f"trial {i}")
+        model.require_joints(trial.dof, f"{name}: trial {i}")
         contact = first_series(trial, model)
         if contact is None:
             continue

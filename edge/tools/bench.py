@@ -30,7 +30,7 @@ from edge.model.model import Model
 from edge.recording import Recording
 from edge.touch.first_contact import first_contact
 from edge.touch.frame import Frame
-from edge.writing import write_whole
+from edge.writing import check_writable, write_whole
 
 RATE_HZ = 100.0
 INSIDE = slice(1, -2)
@@ -58,6 +58,7 @@ def run(arguments: argparse.Namespace) -> int:
     """Measure, write the file, and print a line for each stage."""
     model = Model(arguments.model)
     output = Output.of(arguments)
+    check_writable(Path(arguments.out).parent)
     board = measure(model)
     with write_whole(arguments.out) as file:
         file.write(json.dumps(board, indent=1, ensure_ascii=False).encode() + b"\n")

@@ -13,6 +13,7 @@ import pytest
 from edge import __version__, cli
 from edge.__main__ import main as start
 from edge.bus.protocol import BusMissing
+from edge.demo import MODEL
 from edge.errors import InputError
 from edge.skin import file as skinfile
 from export.__main__ import main as export
@@ -105,6 +106,14 @@ def test_bad_input_is_one_sentence_and_exit_2_and_a_device_exit_3(
 ):
     assert cli.dispatch(top(raising(error("a: not there"))), []) == status
     assert capsys.readouterr().err == "edge-classify: a: not there\n"
+
+
+def test_a_file_that_cannot_even_be_asked_for_is_named(tmp_path, capsys):
+    """Its name is too long, as one in a folder that is closed to the user."""
+    golden = tmp_path / ("g" * 300)
+    assert cli.main(["install", str(MODEL), "--golden", str(golden)]) == 2
+    sentence = f"edge-classify: {golden}: cannot be used: File name too long\n"
+    assert capsys.readouterr().err == sentence
 
 
 def test_ctrl_c_is_exit_130_and_quiet_also_while_the_program_is_loaded(

@@ -96,6 +96,22 @@ def test_a_change_that_was_finished_later_can_be_taken_back(new_days, caplog):
     assert list(days[0].parent.rglob(".*")) == []
 
 
+@pytest.mark.parametrize("text", ['{"labels"', '{"labels": {"a.npz": [NaN, {}]}}'])
+def test_a_damaged_note_may_be_deleted(new_days, text):
+    day, _ = new_days()
+    (day / JOURNAL).write_text(text)
+    with pytest.raises(InputError, match="not a change of labels: .*; delete it"):
+        find([str(day)])
+
+
+def test_a_deletion_is_finished_though_the_folder_of_deleted_ones_is_gone(new_days):
+    day, _ = new_days()
+    (day / JOURNAL).write_text('{"labels": {"a.npz": [{}, null]}}')
+    assert find([str(day)]) == [day / "b.npz"]
+    undo([day])
+    assert find([str(day)]) == [day / "a.npz", day / "b.npz"]
+
+
 @pytest.mark.parametrize("words", [["--set", "object=cup", "--yes"], ["--undo"]])
 def test_two_programs_do_not_change_one_folder(new_days, words, refused, monkeypatch):
     monkeypatch.setattr(saving, "LOOKS", 1)

@@ -147,6 +147,7 @@ def test_a_folder_that_cannot_be_written_is_known_beforehand(tmp_path):
         ("fifo", "it is not a regular file"),
         ("folder", "it is not"),
         ("a\0b", "a null character"),
+        ("a\0b/c", "a null character"),
     ],
 )
 def test_what_is_no_regular_file_is_not_replaced_by_one(tmp_path, name, why):

@@ -393,7 +393,14 @@ def test_early_decisions_are_left_out_to_fit_the_flash_and_said(early, tmp_path)
     text = c_code.export(model, tmp_path, error, whole // 1024 - 1)
     assert text.endswith("early decisions are left out to fit --flash")
     with pytest.raises(InputError, match="kB of flash in C, above --flash"):
-        c_code.export(model, tmp_path, None, 20)
+        c_code.export(model, tmp_path / "none", None, 20)
+    assert not (tmp_path / "none").exists()
+
+
+def test_a_file_in_the_folder_s_place_is_one_sentence(tmp_path):
+    (tmp_path / "file").touch()
+    with pytest.raises(InputError, match="cannot be written: .*file is a file"):
+        c_code.write(Model(demo.MODEL), tmp_path / "file")
 
 
 def test_a_table_takes_the_smallest_type_that_holds_it():

@@ -3,13 +3,18 @@
 import io
 import shutil
 from contextlib import redirect_stderr
+from pathlib import Path
 from types import SimpleNamespace
 from unittest.mock import Mock
 
+import numpy as np
 import pytest
 
+from edge import demo
 from edge.errors import InputError
 from edge.model.model import Model
+from edge.recording import Recording
+from edge.saving import save
 from edge.statistics import wilson
 from export.__main__ import main
 from export.cli import held_out_text
@@ -21,6 +26,9 @@ def test_a_folder_that_cannot_be_written_is_named_before_any_work(tmp_path, caps
     out = tmp_path / "file"
     assert main(["--data", str(tmp_path / "missing"), "--out", str(out)]) == 2
     sentence = f"export: {out}: cannot be written: File exists\n"
+    assert capsys.readouterr().err == sentence
+    words = ["--data", "missing", "--out", str(tmp_path), "--c", str(out)]
+    assert main(words) == 2
     assert capsys.readouterr().err == sentence
 
 
@@ -156,6 +164,7 @@ def test_decision_points_before_a_window_hold_it_fixed(
         ("--window", "0", "must be a number from 0.01 to 60"),
         ("--scaling", "VI", "invalid choice: 'VI'"),
         ("--threshold", "-3", "must be a whole number from 0 to 65534"),
+        ("--c-error", "nan", "must be a number from 1e-06 to 0.999999"),
     ],
 )
 def test_a_number_outside_its_range_is_refused(option, value, sentence, capsys):
@@ -215,8 +224,10 @@ def test_a_former_model_in_the_same_place_is_compared_as_it_was(
     ("words", "sentence"),
     [
         (["--test", "missing"], "missing: cannot be read: No such file or directory"),
+        (["--test", "loop"], "loop: cannot be read: Too many levels of symbolic links"),
         (["--test", "x.npz", "--compare", "old.onnx"], "old.onnx: no such model"),
         (["--compare", "old.onnx"], "--compare needs --test"),
+        (["--flash", "512"], "--c-error and --flash need --c"),
     ],
 )
 def test_held_out_recordings_and_a_former_model_are_checked_before_any_work(
@@ -227,5 +238,19 @@ def test_held_out_recordings_and_a_former_model_are_checked_before_any_work(
     monkeypatch,
 ):
     monkeypatch.setattr("export.cli.fit", Mock(side_effect=AssertionError("fitted")))
+    monkeypatch.chdir(tmp_path)
+    Path("loop").symlink_to("loop")
     assert main(["--data", "data", "--out", str(tmp_path), *words]) == 2
     assert sentence in capsys.readouterr().err
+
+
+def test_a_former_model_that_needs_joints_is_refused_before_any_work(
+    recordings, tmp_path, capsys, monkeypatch
+):
+    monkeypatch.setattr("export.cli.fit", Mock(side_effect=AssertionError("fitted")))
+    touch = tmp_path / "touch.npz"
+    still = np.zeros((2, 16, 24), np.uint16)
+    save(touch, Recording(np.array([0.0, 0.1]), still), lasting=False)
+    words = ["--test", str(touch), "--compare", str(demo.MODEL)]
+    assert main(["--data", str(recordings), "--out", str(tmp_path), *words]) == 2
+    assert f"{touch}: has no joint angles" in capsys.readouterr().err

@@ -49,8 +49,8 @@ def _studied(data: Sequence[str]) -> DataSet:
     dataset = load_trials(data, Measurement(names, LONGEST_S), progress=True)
     if len(dataset.trials) < FEWEST:
         raise InputError(
-            f"{counted(len(dataset.trials), 'trial')} are too few to study; give "
-            f"{FEWEST} or more"
+            f"a study needs at least {FEWEST} trials, not {len(dataset.trials)}; "
+            "record more"
         )
     return dataset
 

@@ -84,6 +84,25 @@ def test_without_a_former_model_there_is_no_way_back(edge, running):
     assert "has no former model to go back to" in err
 
 
+def test_a_damaged_former_model_does_not_come_back(edge, new, running):
+    shutil.copy(new, running)
+    former = running.with_name("model.onnx.former")
+    former.write_bytes(new.read_bytes()[:999])
+    status, _, err = edge("install", "--back", "--to", running)
+    assert status == 2
+    assert f"{former}: not an ONNX model" in err
+    assert running.read_bytes() == new.read_bytes()
+
+
+def test_a_model_that_cannot_be_placed_leaves_no_golden_file(edge, new, tmp_path):
+    folder = tmp_path / "model.onnx"
+    folder.mkdir()
+    status, _, err = edge("install", new, "--to", folder)
+    assert status == 2
+    assert f"{folder}: cannot be written: it is not a regular file" in err
+    assert not list(tmp_path.glob("golden-*"))
+
+
 STEPS = (install, "_write"), (Path, "replace")
 
 

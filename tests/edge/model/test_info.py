@@ -185,7 +185,7 @@ def test_only_a_rule_that_no_confidence_meets_waits_for_a_fixed_window(
     assert is_fixed(StoppingRule(0.1, 1.0, confidence, 3)) is fixed
 
 
-@pytest.mark.parametrize("error", [0.0, 1.0, math.nan])
+@pytest.mark.parametrize("error", [0.0, 1e-320, 1.0, math.nan])
 def test_an_error_rate_lies_inside_0_to_1(error):
-    with pytest.raises(InputError, match="must be above 0 and below 1"):
+    with pytest.raises(InputError, match="must be at least 1e-06 and below 1"):
         stopping_rules(None, error)

@@ -26,6 +26,17 @@ def board(exported, tmp_path_factory):
     return json.loads(out.read_text())
 
 
+def test_a_folder_that_cannot_be_written_is_named_before_any_work(
+    exported, tmp_path, capsys, monkeypatch
+):
+    monkeypatch.delattr(bench, "measure")
+    (tmp_path / "file").touch()
+    out = tmp_path / "file" / "board.json"
+    options = ["--model", str(exported / "model.onnx"), "--out", str(out)]
+    assert main(["bench", *options]) == 2
+    assert f"{out.parent}: cannot be written" in capsys.readouterr().err
+
+
 def test_every_stage_has_a_median_and_a_99th_percentile(board):
     stages = ["track", "features", "decision", "frame", "last"]
     assert list(board["stages"]) == stages

@@ -125,6 +125,13 @@ def test_vectors_of_another_model_are_refused(verify_changed, arrays):
     assert "50), but" in verify_changed()[2]
 
 
+def test_frames_with_other_joints_are_refused_by_the_name_of_the_file(
+    verify_changed, arrays
+):
+    arrays["joints"] = arrays["joints"][:, :3]
+    assert "golden.npz: trial 0: has 3 joint angles" in verify_changed()[2]
+
+
 def test_a_model_is_no_golden_file(verify, exported):
     assert verify(exported / "model.onnx")[0] == 2
 

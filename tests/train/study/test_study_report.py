@@ -163,7 +163,7 @@ def test_in_a_browser_nothing_overflows_or_is_missing(studied):
         (["--data", "nowhere"], "nowhere"),
         (["--jobs", "0"], "--jobs must be at least 1"),
         (["--scene", "nowhere.toml"], "nowhere.toml"),
-        ([], "16 trials are too few to study"),
+        ([], "needs at least 20 trials, not 16"),
     ],
 )
 def test_bad_input_is_one_sentence(words, sentence, recordings, tmp_path, refusal):
