@@ -62,6 +62,16 @@ class Product:
             implied = {self.task: joined}
         return {**implied, **labels}
 
+    def contradiction(self, labels: Labels) -> str | None:
+        """The product's label that follows from a trial's factors, where the trial has
+        another one; None elsewhere.
+
+        >>> CATEGORY.contradiction({"category": "rigid-fixed", "softness": "soft"})
+        'soft-fixed'
+        """
+        implied = self.label(self.completed(labels))
+        return None if labels.get(self.task, implied) == implied else implied
+
 
 CATEGORY = Product("category", ("softness", "mobility"))
 """The paper's categories."""

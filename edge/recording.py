@@ -155,7 +155,7 @@ def checked(path: str, recording: Recording, scale: float | None = None) -> Reco
         elif layout.axes:
             raise InputError("meta.skin says axes = 3, but shear is missing")
         if "labels" in meta:
-            meta["labels"] = _labels(path, meta["labels"])
+            meta["labels"] = read_labels(path, meta["labels"])
         if meta.get("joint_names") is not None:
             _check_joint_names(meta["joint_names"], joints)
     return Recording(t, frames, joints, recording.valid, meta, recording.shear)
@@ -242,15 +242,21 @@ def _are_names(texts: Any) -> bool:
     )
 
 
-def _labels(path: str, values: Any) -> dict[str, str]:
-    """{task: label}; labels that are whole numbers become text."""
+def read_labels(path: str, values: Any) -> dict[str, str]:
+    """{task: label} of a file's metadata; labels that are whole numbers become text.
+
+    Raises:
+        InputError: they are no names.
+    """
     labels = dict(values) if isinstance(values, dict) else {"": ""}
     for task, label in labels.items():
         if type(label) is int or isinstance(label, np.integer):
             labels[task] = str(label)
     names = [*labels, *labels.values()]
     if not _are_names(names):
-        raise InputError("meta.labels must map task names to labels, both text")
+        raise InputError(
+            "meta.labels and meta.contacts must map task names to labels, both text"
+        )
     if not all(name.isprintable() and name == name.strip() for name in names):
         from edge.labels import plain  # few labels need it
 

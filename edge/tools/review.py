@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from edge.events import Decided
+from edge.labels import CATEGORY
 from edge.recording import Recording
 
 UNKNOWN = "unknown"
@@ -76,9 +77,9 @@ def kinds(meta: Mapping[str, Any]) -> list[str]:
 
     A touch is unsure if a decision about it was, or was unknown; it is wrong if its
     label is another than the decision; it is unlabelled if a task that was decided has
-    no label.
+    no label, and none follows from others.
     """
-    labels = meta.get("labels", {})
+    labels = CATEGORY.completed(meta.get("labels", {}))
     decided = decisions(meta)
     belongs = dict.fromkeys(KINDS, False)
     belongs["unlabelled"] = not labels or not labels.keys() >= decided.keys()
@@ -91,15 +92,19 @@ def kinds(meta: Mapping[str, Any]) -> list[str]:
 
 def accepted(meta: Mapping[str, Any]) -> dict[str, str]:
     """{task: label} that accepts the decisions of a kept touch, where they name a label
-    and nobody has given one yet."""
+    and nobody has given one yet, nor others from which another follows."""
     labels = meta.get("labels", {})
-    return {
+    known = CATEGORY.completed(labels)
+    out = {
         task: answer["label"]
         for task, answer in decisions(meta).items()
-        if task not in labels
+        if task not in known
         and isinstance(answer["label"], str)
         and answer["label"] != UNKNOWN
     }
+    if CATEGORY.contradiction({**labels, **out}) is not None:
+        out.pop(CATEGORY.task, None)
+    return out
 
 
 def selected(meta: Mapping[str, Any], words: Sequence[str]) -> bool:

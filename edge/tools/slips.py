@@ -110,8 +110,8 @@ def _contradictions(labels: Labels) -> list[str]:
     task = CATEGORY.task
     contradictions = []
     for trial in labels:
-        implied = CATEGORY.label(trial)
-        if implied is not None and trial.get(task, implied) != implied:
+        implied = CATEGORY.contradiction(trial)
+        if implied is not None:
             contradictions.append(f"{trial[task]!r} beside {implied!r}")
     if not contradictions:
         return []

@@ -77,7 +77,7 @@ WRONG = [
     ({"meta": 3}, "meta must be one JSON text"),
     ({"meta": "{"}, "meta: not JSON"),
     ({"meta": "[1]"}, "meta must be a JSON object"),
-    ({"meta": '{"labels": {"a": true}}'}, "meta.labels must map"),
+    ({"meta": '{"labels": {"a": true}}'}, "meta.labels and meta.contacts must map"),
     (
         {"meta": '{"joint_names": ["a"]}'},
         "number of meta.joint_names is 1, of joint angles 5",

@@ -14,7 +14,7 @@ from edge.touch.frame import Frame
 from edge.touch.layout import SkinLayout, for_device
 from edge.touch.still import Tracker, WatchfulTracker
 from edge.touch.track import ContactTracker
-from train.data.labels import completed, labels_of
+from train.data.labels import completed, contradictory, labels_of
 
 Named = tuple[Recording, Path]
 """A recording and its file."""
@@ -72,21 +72,33 @@ class Touched:
         untouched = [(path, next(labels)) for path, _ in self.untouched]
         return Touched(tuple(trials), tuple(untouched), self.unused)
 
-    def without(self, task: str) -> tuple[Path, ...]:
-        """The files that lack a label for a task, each once."""
-        lacking = (path for path, labels in self.files if task not in labels)
-        return tuple(dict.fromkeys(lacking))
+    def left_out(self, tasks: Sequence[str]) -> dict[str, tuple[Path, ...]]:
+        """{what is lacking: the files that lack it, each once}: a label for a task, or a
+        category that is no contradiction."""
+        odd = contradictory(self.labels)
+        lacking = {
+            "a category that agrees with softness and mobility": [
+                path for path, labels in self.files if labels in odd
+            ]
+        }
+        for task in tasks:
+            lacking[f"a label for {task}"] = [
+                path for path, labels in self.files if task not in labels
+            ]
+        return {need: tuple(dict.fromkeys(paths)) for need, paths in lacking.items()}
 
     def labelled(self, tasks: Sequence[str], *, partial: bool) -> Touched:
-        """The contacts that have a label for each task; `partial`, for some.
+        """The contacts that have a label for each task; `partial`, for some. Those with
+        contradictory labels are left out.
 
         Raises:
             InputError: no trial has.
         """
         enough = any if partial else all
+        odd = contradictory(self.labels)
 
         def suffices(labels: dict[str, str]) -> bool:
-            return enough(task in labels for task in tasks)
+            return labels not in odd and enough(task in labels for task in tasks)
 
         trials = tuple(trial for trial in self.trials if suffices(trial.labels))
         if not trials:

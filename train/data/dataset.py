@@ -233,16 +233,10 @@ def read(data: Sequence[str | Path], *, progress: bool = False) -> Recordings:
         raise InputError("no recordings given; name .npz files or a folder of them")
     digest = hashlib.sha256()
     recordings: list[Recording] = []
-    bad: list[str] = []
     for path in bar(paths, desc="reading", unit=" trials", disable=not progress):
-        try:
-            contents = read_bytes(path, LARGEST_BYTES)
-            recordings.append(load(path, io.BytesIO(contents)))
-            digest.update(contents)
-        except InputError as error:
-            bad.append(str(error))
-    if bad:
-        raise InputError(bad[0])
+        contents = read_bytes(path, LARGEST_BYTES)
+        recordings.append(load(path, io.BytesIO(contents)))
+        digest.update(contents)
     return Recordings(tuple(paths), tuple(recordings), digest.hexdigest())
 
 
@@ -307,7 +301,7 @@ def load_trials(
     it is a list of labels, they belong to the contacts in their order. Labels that
     follow from others are added (`train.data.labels.completed`). Recordings that lack a
     label, or joint angles that a feature needs, are left out and named in `left_out`,
-    if most recordings have it.
+    if most recordings have it; so are those whose labels contradict each other.
 
     Args:
         data: recordings, or `.npz` files and folders of them.
@@ -345,7 +339,7 @@ def load_trials(
     touched = collect(posed.recordings, trials, layout).completed()
     tasks = shared_tasks(touched.labels, partial=partial)
     labelled = touched.labelled(tasks, partial=partial)
-    left_out = {f"a label for {task}": touched.without(task) for task in tasks}
+    left_out = touched.left_out(tasks)
     left_out |= {"joint angles": posed.without_joints, "shear": without_shear}
     return DataSet(
         trials=labelled.trials,

@@ -3,11 +3,10 @@
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from itertools import chain, permutations
-from typing import Any
 
 from edge.errors import InputError
 from edge.labels import CATEGORY, Product
-from edge.recording import Recording
+from edge.recording import Recording, read_labels
 
 NO_CONTACT = "none"
 """The label of a recording in which nothing is touched."""
@@ -24,9 +23,7 @@ def labels_of(recording: Recording, count: int) -> list[dict[str, str]]:
         return [recording.labels]
     if contacts == ALIKE:
         return [recording.labels] * count
-    if not isinstance(contacts, list) or not all(
-        isinstance(labels, dict) for labels in contacts
-    ):
+    if not isinstance(contacts, list):
         raise InputError(
             f'meta.contacts must be "{ALIKE}" or a list of labels, one a contact'
         )
@@ -35,18 +32,10 @@ def labels_of(recording: Recording, count: int) -> list[dict[str, str]]:
             f"meta.contacts labels {len(contacts)} contacts, {count} are found; "
             "correct the labels or the threshold"
         )
-    return [{**recording.labels, **_as_texts(labels)} for labels in contacts]
-
-
-def _as_texts(labels: Mapping[str, Any]) -> dict[str, str]:
-    """A contact's labels; those that are whole numbers become text."""
-    texts = {
-        task: str(label) if type(label) is int else label
-        for task, label in labels.items()
-    }
-    if not all(isinstance(name, str) and name for name in chain(*texts.items())):
-        raise InputError("meta.contacts must map task names to labels, both text")
-    return texts
+    return [
+        {**recording.labels, **read_labels("meta.contacts", labels)}
+        for labels in contacts
+    ]
 
 
 def completed(trials: Sequence[Mapping[str, str]]) -> list[dict[str, str]]:
@@ -54,15 +43,17 @@ def completed(trials: Sequence[Mapping[str, str]]) -> list[dict[str, str]]:
 
     Where a task's labels are those of two others joined by a hyphen, `soft-fixed`
     follows from `soft` and `fixed`, and the reverse. This is so for `CATEGORY`, and for
-    tasks for which it holds in every trial that has all three. No task is added that no
-    trial has.
+    tasks for which it holds in every trial that has all three, but for `contradictory`
+    ones. No task is added that no trial has.
     """
     tasks = set().union(*trials)
+    odd = contradictory(trials)
+    sound = [labels for labels in trials if labels not in odd]
     out = [dict(labels) for labels in trials]
     names = sorted(tasks | {CATEGORY.task, *CATEGORY.factors})
     for task, first, second in permutations(names, 3):
         product = Product(task, (first, second))
-        if _holds(product, trials):
+        if _holds(product, sound):
             out = [product.completed(labels) for labels in out]
     return [
         {task: label for task, label in labels.items() if task in tasks}
@@ -70,19 +61,23 @@ def completed(trials: Sequence[Mapping[str, str]]) -> list[dict[str, str]]:
     ]
 
 
+def contradictory(trials: Sequence[Mapping[str, str]]) -> list[Mapping[str, str]]:
+    """The labels of trials whose category is another than that of their softness and
+    mobility; none where most trials are, whose `category` is something else."""
+    odd = [labels for labels in trials if CATEGORY.contradiction(labels)]
+    return odd if 2 * len(odd) < len(trials) else []
+
+
 def _holds(product: Product, trials: Sequence[Mapping[str, str]]) -> bool:
     """Whether a product's labels are those of its factors in every trial that has all
     three; where none has, whether it is `CATEGORY`."""
-    implied = []
-    labelled = []
-    for labels in trials:
-        joined = product.label(labels)
-        if joined is not None and product.task in labels:
-            implied.append(joined)
-            labelled.append(labels[product.task])
-    if implied != labelled:
-        return False
-    return bool(labelled) or product == CATEGORY
+    complete = {product.task, *product.factors}
+    matches = [
+        product.label(labels) == labels[product.task]
+        for labels in trials
+        if labels.keys() >= complete
+    ]
+    return all(matches) if matches else product == CATEGORY
 
 
 def shared_tasks(

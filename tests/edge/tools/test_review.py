@@ -8,6 +8,8 @@ import pytest
 from edge.tools import review
 from tests.edge.tools.kept import kept_meta
 
+HALVES = {"softness": "soft", "mobility": "fixed"}
+
 
 @pytest.mark.parametrize(
     ("meta", "kinds"),
@@ -18,6 +20,9 @@ from tests.edge.tools.kept import kept_meta
         (kept_meta({"a": "x"}, a=("x", 0.9, "unknown")), ["unsure"]),
         (kept_meta({"a": "y"}, a=("x", 0.9)), ["wrong"]),
         (kept_meta({"b": "z"}, a=("x", 0.9)), ["unlabelled"]),
+        # A category follows from softness and mobility.
+        (kept_meta(HALVES, category=("soft-fixed", 0.9)), []),
+        (kept_meta(HALVES, category=("rigid-fixed", 0.9)), ["wrong"]),
         ({"labels": {}}, ["unlabelled"]),
         ({"labels": {"a": "x"}}, []),
         ({"labels": {"a": "x"}, "decided": 5}, []),
@@ -35,6 +40,15 @@ def test_what_is_unknown_or_out_of_range_is_not_accepted():
 def test_what_a_person_has_labelled_is_not_accepted_otherwise():
     meta = kept_meta({"a": "y"}, a=("x", 0.9), b=("z", 0.9))
     assert review.accepted(meta) == {"b": "z"}
+
+
+def test_what_is_accepted_contradicts_no_label_of_a_person():
+    meta = kept_meta(HALVES, category=("rigid-fixed", 0.9))
+    assert review.accepted(meta) == {}
+    meta = kept_meta(
+        {"softness": "soft"}, category=("rigid-fixed", 0.9), mobility=("fixed", 0.9)
+    )
+    assert review.accepted(meta) == {"mobility": "fixed"}
 
 
 def test_a_recording_is_selected_by_all_words():

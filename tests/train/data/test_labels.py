@@ -5,7 +5,7 @@ import pytest
 from edge.errors import InputError
 from edge.saving import save
 from train.data.dataset import load_trials
-from train.data.labels import completed, shared_tasks
+from train.data.labels import completed, contradictory, shared_tasks
 
 SIMULATED = {
     "category": "rigid-movable",
@@ -65,3 +65,29 @@ def test_trials_that_lack_a_label_stay_for_their_other_tasks(
     assert [path.name for path in partial.left_out["a label for object"]] == [
         "bare.npz"
     ]
+
+
+def test_one_contradictory_trial_takes_nothing_from_sound_ones():
+    sound = {"softness": "soft", "mobility": "fixed"}
+    odd = {**sound, "category": "rigid-fixed"}
+    trials = [sound] * 19 + [odd]
+    assert contradictory(trials) == [odd]
+    assert completed(trials) == [{**sound, "category": "soft-fixed"}] * 19 + [odd]
+
+
+def test_a_category_that_is_never_softness_by_mobility_contradicts_nothing():
+    trials = [{"category": "cup", "softness": "soft", "mobility": "fixed"}] * 3
+    assert contradictory(trials) == []
+
+
+def test_a_recording_whose_labels_contradict_each_other_is_named_and_left_out(
+    make_touch, recordings, tmp_path
+):
+    odd = make_touch(seed=9)
+    odd.meta["labels"] = {**odd.labels, "softness": "soft", "mobility": "movable"}
+    save(tmp_path / "odd.npz", odd)
+    data = load_trials([recordings, tmp_path], partial=True)
+    assert len(data.trials) == 16
+    assert data.left_out == {
+        "a category that agrees with softness and mobility": (tmp_path / "odd.npz",)
+    }
