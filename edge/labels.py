@@ -62,15 +62,21 @@ class Product:
             implied = {self.task: joined}
         return {**implied, **labels}
 
-    def contradiction(self, labels: Labels) -> str | None:
-        """The product's label that follows from a trial's factors, where the trial has
-        another one; None elsewhere.
+    def contradiction(self, labels: Labels) -> str:
+        """A sentence on a trial whose label of the product is another than that of its
+        factors; empty elsewhere.
 
         >>> CATEGORY.contradiction({"category": "rigid-fixed", "softness": "soft"})
-        'soft-fixed'
+        "category='rigid-fixed' contradicts softness and mobility, which say 'soft-fixed'"
         """
         implied = self.label(self.completed(labels))
-        return None if labels.get(self.task, implied) == implied else implied
+        label = labels.get(self.task, implied)
+        if implied is None or label == implied:
+            return ""
+        return (
+            f"{self.task}={label!r} contradicts {' and '.join(self.factors)}, which say "
+            f"{implied!r}"
+        )
 
 
 CATEGORY = Product("category", ("softness", "mobility"))

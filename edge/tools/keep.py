@@ -130,8 +130,7 @@ class Keeper:
         for file in self._folder.glob(f"{STEM}*.npz"):
             numbers += map(int, NUMBER.findall(file.name))
         # Another run may keep touches in this folder in the same second.
-        time = f"{now:%Y%m%dT%H%M%S}-{now.microsecond:06}"
-        name = f"{STEM}{max(numbers) + 1:06}-{time}"
+        name = f"{STEM}{max(numbers) + 1:06}-{now:%Y%m%dT%H%M%S-%f}"
         meta = {
             **self._meta,
             "trial": name,
@@ -145,9 +144,9 @@ class Keeper:
         self._make_room()
         if not path.exists():
             LOG.warning(
-                f"{self._folder}: touches are no longer kept, as labelled ones fill the "
-                f"{MOST_BYTES // 1_000_000} MB that kept ones may take; move them to another "
-                "folder"
+                f"{self._folder}: touches are no longer kept, as labelled or unreadable "
+                f"ones fill the {MOST_BYTES // 1_000_000} MB that kept ones may take; move "
+                "them to another folder"
             )
 
     def _make_room(self) -> None:
@@ -170,12 +169,12 @@ class Keeper:
 
 
 def is_labelled(file: Path) -> bool:
-    """Whether a recording has a label; a damaged one has none."""
+    """Whether a recording has a label; one that cannot be read may have one."""
     with suppress(InputError):
         return bool(
             load_meta(str(file), load_arrays(file, keys=("meta",))).get("labels")
         )
-    return False
+    return True
 
 
 def reasons_of(decided: Sequence[Decided]) -> set[str]:
@@ -195,10 +194,8 @@ def reasons(text: str) -> tuple[str, ...]:
         InputError: one of them is none.
     """
     names = tuple(text.split(","))
-    for name in names:
-        if name not in REASONS:
-            raise InputError(
-                f"--keep-if takes {', '.join(REASONS)}, separated by commas, not "
-                f"{name!r}"
-            )
+    if not set(names) <= set(REASONS):
+        raise InputError(
+            f"--keep-if takes {', '.join(REASONS)}, separated by commas, not {text!r}"
+        )
     return names

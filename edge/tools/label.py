@@ -112,7 +112,15 @@ def _change(
     """
     changes: dict[Path, dict[str, str] | None] = {}
     for path, recording in recordings:
-        after = _after(arguments, path, recording)
+        after = None
+        if not arguments.delete:
+            after = changed(
+                str(path),
+                recording.meta,
+                dict(arguments.set),
+                arguments.unset,
+                accepts=arguments.accept,
+            )
         if recording.labels != after:
             changes[path] = after
             becomes = "is deleted" if after is None else f"becomes {_text(after)}"
@@ -129,17 +137,6 @@ def _change(
     else:
         _print(output, [(path, load(path)) for path, _ in recordings])
     return 0
-
-
-def _after(
-    arguments: argparse.Namespace, path: Path, recording: Recording
-) -> dict[str, str] | None:
-    """The labels that a recording gets; None if it is deleted."""
-    if arguments.delete:
-        return None
-    labels = review.accepted(recording.meta) if arguments.accept else {}
-    labels |= arguments.set
-    return changed(str(path), recording.meta, labels, arguments.unset)
 
 
 def undo(data: Sequence[str], output: Output) -> int:
@@ -205,6 +202,8 @@ def changed(
     meta: Mapping[str, Any],
     labels: Mapping[str, str],
     without: Sequence[str] = (),
+    *,
+    accepts: bool = False,
 ) -> dict[str, str]:
     """A recording's labels after a change.
 
@@ -213,14 +212,19 @@ def changed(
         meta: its metadata.
         labels: {task: its new label}.
         without: tasks whose label is taken away.
+        accepts: the other tasks that lack a label get that of their decision.
 
     Raises:
         InputError: its contacts have their own labels.
     """
-    if meta.get("contacts") and (labels or without):
+    before = meta.get("labels", {})
+    after = {**before, **labels}
+    if accepts:
+        after |= review.accepted({**meta, "labels": after})
+    after = {task: after[task] for task in after if task not in without}
+    if meta.get("contacts") and after != before:
         raise InputError(
             f"{name}: its contacts have labels of their own; `python -m train split` "
             "makes a recording of each"
         )
-    after = {**meta.get("labels", {}), **labels}
-    return {task: after[task] for task in after if task not in without}
+    return after

@@ -20,6 +20,7 @@ from edge.saving import alone, change_all, finish_interrupted, take_back
 from edge.skin.loop import Schedule
 from edge.tools import review
 from edge.tools.label import changed
+from edge.tools.slips import doubts
 from edge.tools.web import WebServer
 from edge.touch.contact import Contact
 from edge.touch.frame import Frame
@@ -35,7 +36,6 @@ LAST_TRIALS = 200
 LAST_NOTICES = 8
 CURVE_S = 5.0
 """Of a contact, the page draws so many seconds from its onset."""
-MOST_LABELS = 16
 LONGEST_LABEL = 80
 
 
@@ -82,9 +82,9 @@ class Page:
         self._trials: dict[str, Json] = {}
         self._notices: deque[str] = deque(maxlen=LAST_NOTICES)
         self._version = 0
-        """Number of changes of the list of trials."""
-        self._undo: str | None = None
-        """The file that the last action changed or deleted."""
+        """Number of changes of the list of trials, and of the labels."""
+        self._undo: list[str] = []
+        """The files that the last action changed or deleted."""
         self.look()
         self._tracker = ContactTracker(layout, horizon_s=CURVE_S)
         self._contact: Contact | None = None
@@ -152,9 +152,10 @@ class Page:
         """Add a trial that has been recorded."""
         self._trials[path.name] = {
             "labels": trial.labels,
-            "seconds": round(float(trial.t[-1] - trial.t[0]), 2),
+            "seconds": round(float(np.ptp(trial.t)), 2),
             "curve": review.curve(trial),
             "decided": review.decisions(trial.meta),
+            "accepted": review.accepted(trial.meta),
             "kinds": review.kinds(trial.meta),
         }
         self._version += 1
@@ -202,8 +203,9 @@ class Page:
             if path.name not in self._trials:
                 self._show_trial(path)
 
-    def _act(self, action: Json) -> list[Json] | None:
-        """Carry out an action of the page; the list of trials where it asks for it.
+    def _act(self, action: Json) -> Json | None:
+        """Carry out an action of the page; the list of trials where it asks for it, with
+        what is doubtful about their labels and about those of the next one.
 
         Raises:
             InputError: it is none, it is not possible here, or a trial cannot be read.
@@ -214,11 +216,9 @@ class Page:
         if kind == "trials":
             if self._fixed["decides"]:
                 self.look()
-            trials = list(self._trials.items())
-            return [{"file": name, **trial} for name, trial in trials]
+            return self._list()
         if kind == "labels":
-            labels = {**self.labels, **_labels(action)}
-            self.labels = _labels({"labels": labels})
+            self.labels = {**self.labels, **_labels(action)}
         elif kind == "unlabel":
             labels = dict(self.labels)
             labels.pop(str(action.get("task")), None)
@@ -232,7 +232,15 @@ class Page:
             self._change(self._folder, action)
         else:
             raise InputError(f"{kind!r} is no action")
+        self._version += 1
         return None
+
+    def _list(self) -> Json:
+        """The trials and the labels of the next one, with what is doubtful about each."""
+        listed = dict(self._trials)  # another thread adds to them
+        trials = [{"file": name, **trial} for name, trial in listed.items()]
+        labels = [trial["labels"] for trial in trials]
+        return {"trials": trials, "doubts": doubts([*labels, self.labels])}
 
     def _switch(self, on: bool) -> None:
         """Begin or stop saving trials.
@@ -245,49 +253,33 @@ class Page:
         self.recording = on
 
     def _change(self, folder: Path, action: Json) -> None:
-        """Label or delete a trial, so that it can be taken back.
+        """Label or delete trials, so that it can be taken back.
 
         Raises:
-            InputError: the page shows no such trial, it has no decision to accept, or
-                it cannot be read or written.
+            InputError: the page does not show all of them, or one cannot be read or
+                written.
         """
-        name = action.get("file")
-        if name not in list(self._trials):
-            raise InputError(f"{name!r} is none of the trials that this page shows")
-        path = folder / str(name)
+        files = action.get("files") or [None]
+        if not set(self._trials).issuperset(files):
+            raise InputError(f"{files} are none of the trials that this page shows")
         with alone([folder]):
-            if action["do"] == "delete":
-                change_all({path: None})
-                del self._trials[path.name]
-                self._version += 1
-            else:
-                self._relabel(path, action)
-                self._show_trial(path)
-        self._undo = path.name
-
-    def _relabel(self, path: Path, action: Json) -> None:
-        """Give a trial the labels of an action, or accept its decisions.
-
-        Raises:
-            InputError: it has no decision to accept, or cannot be read or written.
-        """
-        meta = load(path).meta
-        accepts = action["do"] == "accept"
-        labels = review.accepted(meta) if accepts else _labels(action)
-        if not labels:
-            raise InputError(
-                f"{path.name}: no decision names a label that it does not have yet"
-            )
-        change_all({path: changed(str(path), meta, labels)})
+            changes = _changes([folder / name for name in files], action)
+            change_all(changes)
+            for path, labels in changes.items():
+                if labels is None:
+                    del self._trials[path.name]
+                else:
+                    self._show_trial(path)
+        self._undo = files
 
     def _take_back(self, folder: Path) -> None:
         """Bring back what the last action changed or deleted."""
-        if self._undo is None:
+        if not self._undo:
             raise InputError("there is nothing to undo")
         with alone([folder]):
             for path in take_back([folder]):
                 self._show_trial(path)
-        self._undo = None
+        self._undo = []
 
 
 def _decision(event: Decided) -> Json:
@@ -298,6 +290,22 @@ def _decision(event: Decided) -> Json:
     return {**event.to_dict(), "neighbours": neighbours}
 
 
+def _changes(paths: Sequence[Path], action: Json) -> dict[Path, dict[str, str] | None]:
+    """The labels that an action gives to trials; None where it deletes them.
+
+    Raises:
+        InputError: one cannot be read, or the labels are no names.
+    """
+    if action["do"] == "delete":
+        return dict.fromkeys(paths)
+    accepts = action["do"] == "accept"
+    labels = {} if accepts else _labels(action)
+    return {
+        path: changed(str(path), load(path).meta, labels, accepts=accepts)
+        for path in paths
+    }
+
+
 def _labels(action: Json) -> dict[str, str]:
     """The labels of an action.
 
@@ -305,8 +313,8 @@ def _labels(action: Json) -> dict[str, str]:
         InputError: they are not names with names.
     """
     labels = action.get("labels")
-    if not isinstance(labels, dict) or not 1 <= len(labels) <= MOST_LABELS:
-        raise InputError(f"give 1 to {MOST_LABELS} labels, each as TASK=LABEL")
+    if not isinstance(labels, dict) or not labels:
+        raise InputError("give labels, each as TASK=LABEL")
     for text in (*labels, *labels.values()):
         printable = isinstance(text, str) and text.strip().isprintable()
         if not printable or not 0 < len(text.strip()) <= LONGEST_LABEL:

@@ -19,11 +19,11 @@ CURVE = 32
 """Points of a small curve."""
 
 
-def curve(recording: Recording, points: int = CURVE) -> list[int]:
+def curve(recording: Recording) -> list[int]:
     """The largest count of a touch over time, in percent of its highest; the largest of
     each part of the recording."""
     peaks = recording.frames.reshape(len(recording.t), -1).max(axis=1)
-    spans = np.array_split(peaks, min(points, len(peaks)))
+    spans = np.array_split(peaks, min(CURVE, len(peaks)))
     highest = max(int(peaks.max()), 1)
     return [int(span.max()) * 100 // highest for span in spans]
 
@@ -84,8 +84,8 @@ def kinds(meta: Mapping[str, Any]) -> list[str]:
     belongs = dict.fromkeys(KINDS, False)
     belongs["unlabelled"] = not labels or not labels.keys() >= decided.keys()
     for task, answer in decided.items():
-        belongs["unsure"] |= is_unsure(answer["confidence"])
-        belongs["unsure"] |= UNKNOWN in answer["flags"]
+        unsure = is_unsure(answer["confidence"]) or UNKNOWN in answer["flags"]
+        belongs["unsure"] |= unsure
         belongs["wrong"] |= labels.get(task, answer["label"]) != answer["label"]
     return [kind for kind in KINDS if belongs[kind]]
 
@@ -98,11 +98,9 @@ def accepted(meta: Mapping[str, Any]) -> dict[str, str]:
     out = {
         task: answer["label"]
         for task, answer in decisions(meta).items()
-        if task not in known
-        and isinstance(answer["label"], str)
-        and answer["label"] != UNKNOWN
+        if task not in known and answer["label"] not in (None, UNKNOWN)
     }
-    if CATEGORY.contradiction({**labels, **out}) is not None:
+    if CATEGORY.contradiction({**labels, **out}):
         out.pop(CATEGORY.task, None)
     return out
 

@@ -31,10 +31,31 @@ def slips(labels: Labels) -> list[str]:
     ["object='Box' on 1 of 9 recordings; is it 'box'?"]
     """
     tasks = Counter(task for trial in labels for task in trial)
-    sentences = _rare("task ", tasks, len(labels)) + _contradictions(labels)
+    sentences = _rare("task ", tasks, len(labels))
+    for sentence, count in Counter(map(CATEGORY.contradiction, labels)).items():
+        if sentence:
+            sentences.append(f"{sentence}, on {count} of {len(labels)} recordings")
     for task in sorted(tasks):
         counts = _label_counts(task, labels)
         sentences += _rare(f"{task}=", counts, counts.total())
+    return sentences
+
+
+def doubts(labels: Labels) -> list[list[str]]:
+    """Of each recording, a sentence for each label that is probably a slip, or
+    contradicts others.
+
+    >>> doubts([{"object": "box"}] * 8 + [{"object": "Box"}])[-1]
+    ["object='Box': is it 'box'?"]
+    """
+    slip = {}
+    for task in set().union(*labels):
+        for name, likely in _likely(_label_counts(task, labels)).items():
+            slip[task, name] = f"{task}={name!r}: is it {likely!r}?"
+    sentences = []
+    for trial in labels:
+        named = [CATEGORY.contradiction(trial), *map(slip.get, trial.items())]
+        sentences.append(list(filter(None, named)))
     return sentences
 
 
@@ -64,22 +85,30 @@ def _rare(thing: str, counts: Mapping[str, int], total: int) -> list[str]:
         total: recordings that could have one.
     """
     sentences = []
+    likely = _likely(counts)
     for name, count in sorted(counts.items()):
-        meant = _meant(name, count, counts)
-        if meant is not None:
+        if name in likely:
             sentences.append(
-                f"{thing}{name!r} on {count} of {total} recordings; is it {meant!r}?"
+                f"{thing}{name!r} on {count} of {total} recordings; is it "
+                f"{likely[name]!r}?"
             )
         elif count == 1 and len(counts) < total:
             sentences.append(f"{thing}{name!r} on a single recording")
     return sentences[:MOST]
 
 
-def _meant(name: str, count: int, counts: Mapping[str, int]) -> str | None:
+def _likely(counts: Mapping[str, int]) -> dict[str, str]:
+    """{name: the more frequent one that it is probably a slip of}."""
+    meant = {name: _meant(name, counts) for name in counts}
+    return {name: other for name, other in meant.items() if other is not None}
+
+
+def _meant(name: str, counts: Mapping[str, int]) -> str | None:
     """The more frequent name that one is probably a slip of."""
     if len(counts) > MOST_NAMES:  # too many to be compared with each other
         return None
     plain = _plain(name)
+    count = counts[name]
     share = FEW_SHARE if len(plain) > SHORT else RARE_SHARE
     for candidate, frequent in counts.items():
         is_rare = count <= share * frequent
@@ -103,19 +132,3 @@ def _alike(first: str, second: str) -> bool:
     matcher = SequenceMatcher(None, first, second)
     equal = sum(block.size for block in matcher.get_matching_blocks())
     return longest - equal <= max(1, longest // LETTERS_PER_SLIP)
-
-
-def _contradictions(labels: Labels) -> list[str]:
-    """Sentences on trials whose category is not that of their softness and mobility."""
-    task = CATEGORY.task
-    contradictions = []
-    for trial in labels:
-        implied = CATEGORY.contradiction(trial)
-        if implied is not None:
-            contradictions.append(f"{trial[task]!r} beside {implied!r}")
-    if not contradictions:
-        return []
-    return [
-        f"{task} contradicts {' and '.join(CATEGORY.factors)} on {len(contradictions)} of "
-        f"{len(labels)} recordings, such as {contradictions[0]}"
-    ]

@@ -53,7 +53,7 @@ WATCHED_S = 2.0
 PICTURE_S = 0.1
 """Time between two pictures of a stream."""
 LARGEST_HEAD = 4096
-LARGEST_ACTION = 4096
+LARGEST_ACTION = 65536
 MOST_CONNECTIONS = 32
 MOST_OF_ONE = 8
 """Connections of one address."""

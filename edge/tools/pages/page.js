@@ -9,6 +9,8 @@ let latest = null;
 let trials = [];
 let version = null;
 let askedAt = 0;
+// So long a message is shown.
+const SHOWN_MS = 60000;
 
 // A text that stays as it is can be selected, and is not read out again.
 function say(id, text) {
@@ -213,121 +215,198 @@ function post(action) {
   }).catch(() => null);
 }
 
-async function act(action) {
+// A text with a button that hides it.
+function message(node, text, hide) {
+  const button = element("button", "×");
+  button.type = "button";
+  button.setAttribute("aria-label", "hide this message");
+  button.onclick = hide;
+  node.replaceChildren(text, " ", button);
+  return node;
+}
+
+// One action after another: a label that is still being written comes before Record.
+let acted = Promise.resolve();
+
+function act(action) {
+  acted = acted.then(() => send(action));
+  return acted;
+}
+
+async function send(action) {
   const answer = await post(action);
   const failed = !answer || !answer.ok;
   $("error").hidden = !failed;
-  if (failed) $("error").textContent = (answer && await answer.text()) || "The program did not answer.";
+  if (failed) {
+    const hide = () => { $("error").hidden = true; };
+    message($("error"), (answer && await answer.text()) || "The program did not answer.", hide);
+    setTimeout(hide, SHOWN_MS);
+  }
   return !failed;
 }
 
-function labelRow(task, label) {
-  const row = element("div", undefined, "label-row");
-  row.onchange = () => { row.dataset.task = changeLabel(row); };
-  row.dataset.task = task;
-  const inputs = [["task", task], ["label", label]].map(([name, value]) => {
-    const input = element("input");
-    input.placeholder = name;
-    input.setAttribute("aria-label", name);
-    input.value = value;
-    input.maxLength = 80;
+// The labels that a task can have: its fixed ones, then those that touches have already.
+function namesOf(task) {
+  const used = trials.map((trial) => trial.labels[task]).filter(Boolean);
+  return [...new Set([...(latest.choices[task] || []), ...used])].slice(0, 30);
+}
+
+function field(name) {
+  const input = element("input");
+  input.placeholder = name;
+  input.maxLength = 80;
+  return input;
+}
+
+// A task's labels as buttons, beside a field for a new one.
+function taskGroup(task, choose) {
+  const group = element("fieldset");
+  group.dataset.task = task;
+  group.append(element("legend", task));
+  for (const name of namesOf(task)) {
+    const button = element("button", name);
+    button.type = "button";
+    button.dataset.label = name;
+    button.onclick = () => choose(task, name);
+    group.append(button);
+  }
+  const input = field("new");
+  input.setAttribute("aria-label", `new label for ${task}`);
+  input.onchange = () => input.value.trim() && choose(task, input.value.trim());
+  group.append(input);
+  return group;
+}
+
+// Shows which label is chosen; one without a button stands in the field.
+function mark(group, label) {
+  const buttons = [...group.querySelectorAll("button[data-label]")];
+  for (const button of buttons) button.setAttribute("aria-pressed", button.dataset.label === label);
+  const input = group.querySelector("input");
+  const hasButton = buttons.some((button) => button.dataset.label === label);
+  if (input !== document.activeElement) input.value = hasButton ? "" : label || "";
+}
+
+// A folded line with a field for a task and one for its label.
+function newTask(choose) {
+  const box = element("details");
+  const [task, label] = ["task", "label"].map((name) => {
+    const input = field(name);
+    input.setAttribute("aria-label", `new ${name}`);
     return input;
   });
-  const remove = element("button", "−");
-  remove.type = "button";
-  remove.setAttribute("aria-label", "remove this task");
-  remove.onclick = () => { row.remove(); if (row.dataset.task) act({ do: "unlabel", task: row.dataset.task }); };
-  row.append(...inputs, remove);
-  $("label-rows").append(row);
+  task.onchange = label.onchange = () => {
+    if (!task.value.trim() || !label.value.trim()) return;
+    choose(task.value.trim(), label.value.trim());
+    task.value = label.value = "";
+    box.open = false;
+  };
+  box.append(element("summary", "Add a task"), task, " ", label);
+  return box;
 }
 
-function rowLabel(row) {
-  return [...row.querySelectorAll("input")].map((input) => input.value.trim());
+// The digits press the fixed labels, so that no new label moves a digit to another one.
+function setDigits(box) {
+  const fixed = [...box.querySelectorAll("button[data-label]")].filter((button) =>
+    (latest.choices[button.parentNode.dataset.task] || []).includes(button.dataset.label));
+  fixed.slice(0, 9).forEach((button, i) => {
+    button.dataset.key = i + 1;
+    button.textContent = `${i + 1} ${button.dataset.label}`;
+  });
 }
 
-// A label applies as soon as it is chosen; returns the row's task.
-function changeLabel(row) {
-  const [task, label] = rowLabel(row);
-  const former = row.dataset.task;
-  if (!task || !label) {
-    if (former in latest.labels) $("label-rows").dataset.shown = "";
-    return former;
+// Labels for touches of the list, which change when they are saved: those of the next touch
+// are not these. There is one such form at a time.
+function edit(place, filesOf) {
+  document.querySelectorAll(".editor").forEach((other) => other.remove());
+  const files = filesOf();
+  const touched = trials.filter((trial) => files.includes(trial.file));
+  const chosen = {};
+  const form = element("form", undefined, "editor");
+  const choose = (task, label) => {
+    chosen[task] = label;
+    const group = [...form.querySelectorAll("fieldset")].find((it) => it.dataset.task === task) || add(task);
+    mark(group, label);
+  };
+  const add = (task) => {
+    const group = taskGroup(task, choose);
+    form.querySelector("details").before(group);
+    return group;
+  };
+  form.append(newTask(choose));
+  const tasks = touched.flatMap((trial) => [...Object.keys(trial.labels), ...Object.keys(trial.decided)]);
+  for (const task of new Set([...Object.keys(latest.choices), ...tasks])) {
+    const labels = new Set(touched.map((trial) => trial.labels[task]));
+    mark(add(task), labels.size === 1 ? [...labels][0] : undefined);
   }
-  act({ do: "labels", labels: { [task]: label } })
-    .then((done) => done && former && former !== task && act({ do: "unlabel", task: former }));
-  return task;
-}
-
-// The program's labels, and those that have just been written into the form.
-function chosenLabels() {
-  const rows = [...$("label-rows").children].map(rowLabel);
-  return { ...latest.labels, ...Object.fromEntries(rows.filter(([task, label]) => task && label)) };
-}
-
-// The rows of free text show the program's labels, whichever browser gave them.
-function drawRows(picture) {
-  const box = $("label-rows");
-  const labels = Object.entries(picture.labels).filter(([task]) => !(task in picture.choices));
-  if (!labels.length && !Object.keys(picture.choices).length) labels.push(["object", ""]);
-  const text = JSON.stringify(labels);
-  if (box.dataset.shown === text || box.contains(document.activeElement)) return;
-  box.dataset.shown = text;
-  box.replaceChildren();
-  for (const [task, label] of labels) labelRow(task, label);
+  setDigits(form);
+  const buttons = element("p", undefined, "buttons");
+  const cancel = element("button", "Cancel");
+  cancel.type = "button";
+  cancel.onclick = () => form.remove();
+  buttons.append(element("button", "Save"), cancel);
+  form.append(buttons);
+  form.onsubmit = async (event) => {
+    event.preventDefault();
+    for (const input of form.querySelectorAll("input")) input.onchange();
+    const labels = { ...chosen };
+    if (Object.keys(labels).length && !await act({ do: "relabel", files: filesOf(), labels })) return;
+    form.remove();
+    if (place === $("ticked")) tickAll(false);
+  };
+  place.append(form);
+  form.querySelector("button, input").focus();
+  form.scrollIntoView({ block: "nearest" });
 }
 
 function labelText(labels) {
   return Object.entries(labels).map(([task, label]) => `${task}=${label}`).join(", ");
 }
 
-// Buttons for the labels of each task that has a fixed choice; a number presses one.
-function drawChoices(picture) {
+// The labels of the next touch, which change here alone; the program's, whichever browser gave them.
+function drawForm(picture) {
   const box = $("choices");
-  const shape = JSON.stringify(picture.choices);
-  if (box.dataset.shape !== shape) {
+  const tasks = new Set([...Object.keys(picture.choices), ...Object.keys(picture.labels)]);
+  if (!tasks.size) tasks.add("object");
+  const shape = JSON.stringify([...tasks].map((task) => [task, namesOf(task)]));
+  const writes = document.activeElement.tagName === "INPUT" && $("labels").contains(document.activeElement);
+  if (box.dataset.shape !== shape && !writes) {
     box.dataset.shape = shape;
-    let digit = 0;
-    box.replaceChildren(...Object.entries(picture.choices).map(([task, names]) => {
-      const group = element("fieldset");
-      group.dataset.task = task;
-      group.append(element("legend", task));
-      for (const name of names) {
-        digit += 1;
-        const button = element("button", digit < 10 ? `${digit} ${name}` : name);
-        button.type = "button";
-        button.dataset.task = task;
-        button.dataset.label = name;
-        if (digit < 10) button.dataset.key = digit;
-        button.onclick = () => act({ do: "labels", labels: { [task]: name } });
-        group.append(button);
-      }
+    const choose = (task, label) => act({ do: "labels", labels: { [task]: label } });
+    const groups = [...tasks].map((task) => {
+      const group = taskGroup(task, choose);
+      const remove = element("button", "−");
+      remove.type = "button";
+      remove.setAttribute("aria-label", `no label for ${task}`);
+      remove.onclick = () => act({ do: "unlabel", task });
+      group.append(remove);
       return group;
-    }));
-  }
-  for (const button of box.querySelectorAll("button")) {
-    button.setAttribute("aria-pressed", picture.labels[button.dataset.task] === button.dataset.label);
+    });
+    box.replaceChildren(...groups, newTask(choose));
+    setDigits(box);
   }
   const decided = Object.fromEntries(picture.decisions.map((it) => [it.task, `decided: ${answerText(it)}`]));
-  for (const group of box.children) {
+  for (const group of box.querySelectorAll("fieldset")) {
     const task = group.dataset.task;
+    mark(group, picture.labels[task]);
     const text = task in decided ? `${task}, ${decided[task]}` : task;
     if (group.firstChild.textContent !== text) group.firstChild.textContent = text;
   }
 }
 
 function drawRecord(picture) {
-  $("record-part").hidden = picture.folder === null;
+  const records = picture.folder !== null && !picture.decides;
+  $("next").hidden = $("record-part").hidden = !records;
+  $("touches-part").hidden = picture.folder === null;
   if (picture.folder === null) return;
-  $("record").hidden = picture.decides;
-  drawChoices(picture);
-  drawRows(picture);
-  $("record").setAttribute("aria-pressed", picture.recording);
-  say("record", picture.recording ? "Stop recording" : "Record");
-  const what = labelText(picture.labels) || "no labels yet";
-  const count = trials.length;
-  const number = `${count} ${count === 1 ? "touch" : "touches"} in ${picture.folder}.`;
-  const saved = picture.recording ? `Each contact is saved with ${what}; ` : `Contacts are not saved (${what}); `;
-  say("recording", picture.decides ? number : saved + number);
+  if (records) {
+    drawForm(picture);
+    const what = labelText(picture.labels);
+    $("record").setAttribute("aria-pressed", picture.recording);
+    say("record", picture.recording ? "Stop" : "Record");
+    say("recording", !what ? "Give a label, then record."
+      : picture.recording ? `Each touch is saved as ${what}.` : `Not recording. The next touch would be ${what}.`);
+  }
+  say("folder", `${trials.length} ${trials.length === 1 ? "touch" : "touches"} in ${picture.folder}.`);
   const late = picture.decides && performance.now() - askedAt > 2000;
   if (picture.trials !== version || late) fetchTrials(picture.trials);
 }
@@ -338,7 +417,9 @@ async function fetchTrials(number) {
   askedAt = performance.now();
   const answer = await post({ do: "trials" });
   if (!answer || !answer.ok) return;
-  trials = await answer.json();
+  const list = await answer.json();
+  trials = list.trials.map((trial, i) => ({ ...trial, doubts: list.doubts[i] }));
+  $("doubts").replaceChildren(...list.doubts.at(-1).map((text) => element("li", text)));
   drawTrials();
 }
 
@@ -388,56 +469,121 @@ function smallCurve(percent) {
   return svg;
 }
 
+// Text that breaks at hyphens rather than within a word.
+function breaking(tag, text, className) {
+  const node = element(tag, undefined, className);
+  for (const part of text.split(/(?<=[-_])/)) node.append(part, element("wbr"));
+  return node;
+}
+
 // New touches come last, and a row is made anew only where its touch has changed: nothing moves
-// under the pointer, and the focus stays at its button.
+// under the pointer, the focus stays at its button, and what is being written stays.
 function drawTrials() {
   drawFilter();
-  const body = $("trials");
-  const focused = document.activeElement.closest("#trials tr");
-  const place = focused && focused.sectionRowIndex;
+  const list = $("trials");
+  const focused = document.activeElement.closest("#trials > li");
+  const place = focused && [...list.children].indexOf(focused);
   const name = document.activeElement.textContent;
-  const former = new Map([...body.rows].map((row) => [row.dataset.text, row]));
-  const rows = shownTrials().map((trial) => former.get(JSON.stringify(trial)) || trialRow(trial));
-  const kept = new Set(rows);
-  for (const row of [...body.rows]) if (!kept.has(row)) row.remove();
-  rows.forEach((row, i) => { if (body.rows[i] !== row) body.insertBefore(row, body.rows[i] || null); });
-  if (!focused || body.contains(focused) || !rows.length) return;
+  const former = new Map([...list.children].map((row) => [row.dataset.file, row]));
+  const rows = shownTrials().map((trial) => {
+    const row = former.get(trial.file);
+    if (row && row.dataset.text === JSON.stringify(trial)) return row;
+    const fresh = trialRow(trial);
+    const form = row && row.querySelector(".editor");
+    if (form) fresh.append(form);
+    if (row) fresh.firstChild.checked = row.firstChild.checked;
+    return fresh;
+  });
+  const present = new Set(rows);
+  for (const row of [...list.children]) if (!present.has(row)) row.remove();
+  rows.forEach((row, i) => { if (list.children[i] !== row) list.insertBefore(row, list.children[i] || null); });
+  drawTicked();
+  if (!focused || list.contains(focused) || !rows.length) return;
   const buttons = [...rows[Math.min(place, rows.length - 1)].querySelectorAll("button")];
-  buttons.find((button) => button.textContent === name).focus();
+  (buttons.find((button) => button.textContent === name) || buttons[0]).focus();
+}
+
+function tickedFiles() {
+  return [...document.querySelectorAll("#trials > li > input:checked")].map((tick) => tick.parentNode.dataset.file);
+}
+
+function tickAll(on) {
+  for (const tick of document.querySelectorAll("#trials > li > input")) tick.checked = on;
+  drawTicked();
+}
+
+function drawTicked() {
+  const files = tickedFiles();
+  $("ticked").hidden = !files.length;
+  $("all").checked = files.length > 0 && files.length === $("trials").children.length;
+  say("number", `${files.length} ticked:`);
+  $("accept-ticked").hidden = !trials.some((trial) => files.includes(trial.file) && canAccept(trial));
+}
+
+function canAccept(trial) {
+  return Object.keys(trial.accepted).length > 0;
+}
+
+function remove(files) {
+  const what = files.length === 1 ? files[0] : `${files.length} touches`;
+  if (confirm(`Delete ${what}?`)) act({ do: "delete", files });
 }
 
 function trialRow(trial) {
-  const row = element("tr");
+  const row = element("li");
   row.dataset.text = JSON.stringify(trial);
-  const buttons = element("td");
-  const decided = Object.entries(trial.decided);
-  if (decided.length) {
-    const accept = element("button", "Accept");
-    accept.title = `Label ${trial.file} as it was decided`;
-    accept.onclick = () => act({ do: "accept", file: trial.file });
-    buttons.append(accept, " ");
+  row.dataset.file = trial.file;
+  const files = [trial.file];
+  const tick = element("input");
+  tick.type = "checkbox";
+  tick.setAttribute("aria-label", `tick ${trial.file}`);
+  tick.onchange = drawTicked;
+  const buttons = element("div", undefined, "buttons");
+  const add = (text, title, action) => {
+    const button = element("button", text);
+    button.title = title;
+    button.onclick = action;
+    buttons.append(button);
+  };
+  if (canAccept(trial)) {
+    add("Accept", `Label it ${labelText(trial.accepted)}, as it was decided`, () => act({ do: "accept", files }));
   }
-  const relabel = element("button", decided.length ? "Correct" : "Relabel");
-  relabel.title = `Give ${trial.file} the labels chosen above; its other tasks keep theirs`;
-  relabel.onclick = () => act({ do: "relabel", file: trial.file, labels: chosenLabels() });
-  const remove = element("button", "Delete");
-  remove.title = `Delete ${trial.file}`;
-  remove.onclick = () => confirm(`Delete ${trial.file}?`) && act({ do: "delete", file: trial.file });
-  buttons.append(relabel, " ", remove);
-  const name = element("td", trial.file);
-  name.append(element("div", `${trial.seconds.toFixed(2)} s`, "near"));
-  const picture = element("td", undefined, "small");
-  picture.append(smallCurve(trial.curve));
-  const what = element("td", labelText(trial.labels) || "no label");
-  for (const [task, answer] of decided) what.append(element("div", `${task}: ${answerText(answer)}`, "near"));
-  for (const kind of trial.kinds) what.append(element("span", kind, "flag"));
-  row.append(picture, name, what, buttons);
+  const decided = Object.entries(trial.decided);
+  add(decided.length ? "Correct" : "Relabel", "Give it other labels", () => edit(row, () => files));
+  add("Delete", `Delete ${trial.file}`, () => remove(files));
+  const text = element("div");
+  text.append(breaking("strong", labelText(trial.labels) || "no label"));
+  text.append(breaking("div", `${trial.file}, ${trial.seconds.toFixed(2)} s`, "near"));
+  for (const [task, answer] of decided) text.append(element("div", `${task}: ${answerText(answer)}`, "near"));
+  for (const kind of trial.kinds) text.append(element("span", kind, "flag"));
+  for (const doubt of trial.doubts) text.append(element("div", doubt, "doubt"));
+  row.append(tick, smallCurve(trial.curve), text, buttons);
   return row;
 }
 
-function drawUndo(picture) {
-  $("undo").hidden = !picture.undo;
-  say("undo", picture.undo ? `Undo the change of ${picture.undo}` : "Undo");
+function drawUndo({ undo }) {
+  $("undo").hidden = !undo.length;
+  say("undo", `Undo the change of ${undo.length === 1 ? undo[0] : `${undo.length} touches`}`);
+}
+
+// The notices are the last of a stream: those that follow the former ones are new. Each goes after
+// a while, or when a person hides it.
+let formerNotices = [];
+
+function drawNotices(picture) {
+  let known = formerNotices;
+  while (!known.every((text, i) => text === picture.notices[i])) known = known.slice(1);
+  for (const text of picture.notices.slice(known.length)) {
+    const notice = element("li");
+    const hide = () => {
+      notice.remove();
+      $("notice-part").hidden = !$("notices").children.length;
+    };
+    $("notices").append(message(notice, text, hide));
+    setTimeout(hide, SHOWN_MS);
+    $("notice-part").hidden = false;
+  }
+  formerNotices = picture.notices;
 }
 
 function draw(picture) {
@@ -452,27 +598,24 @@ function draw(picture) {
   drawDecisions(picture);
   drawRecord(picture);
   drawUndo(picture);
-  $("notice-part").hidden = !picture.notices.length;
-  const notices = JSON.stringify(picture.notices);
-  if ($("notices").dataset.shown === notices) return;
-  $("notices").dataset.shown = notices;
-  $("notices").replaceChildren(...picture.notices.map((text) => element("li", text)));
+  drawNotices(picture);
 }
 
 $("undo").onclick = () => act({ do: "undo" });
-$("more").onclick = () => labelRow("", "");
+$("all").onchange = () => tickAll($("all").checked);
+$("accept-ticked").onclick = async () => await act({ do: "accept", files: tickedFiles() }) && tickAll(false);
+$("label-ticked").onclick = () => edit($("ticked"), tickedFiles);
+$("delete-ticked").onclick = () => remove(tickedFiles());
 $("labels").onsubmit = (event) => event.preventDefault();
 $("filter").onchange = drawTrials;
 addEventListener("keydown", (event) => {
-  if (["INPUT", "SELECT", "TEXTAREA"].includes(event.target.tagName) || event.ctrlKey || event.metaKey) return;
-  const button = document.querySelector(`#choices button[data-key="${event.key}"]`);
+  const writes = event.target.matches("select, textarea, input:not([type=checkbox])");
+  if (writes || event.ctrlKey || event.metaKey) return;
+  const form = document.querySelector(".editor") || $("choices");
+  const button = form.querySelector(`button[data-key="${event.key}"]`);
   if (button) button.click();
 });
-$("record").onclick = async () => {
-  const on = !(latest && latest.recording);
-  const labels = chosenLabels();
-  if (!on || !Object.keys(labels).length || await act({ do: "labels", labels })) act({ do: "record", on });
-};
+$("record").onclick = () => act({ do: "record", on: !(latest && latest.recording) });
 addEventListener("resize", () => latest && draw(latest));
 
 // A stream of pictures; the browser opens it again by itself where it breaks.

@@ -66,6 +66,14 @@ def test_what_is_sure_is_not_kept(edge, tmp_path):
     assert list(tmp_path.iterdir()) == []
 
 
+def save_touch(path, frames=1200, labels=None):
+    """A recording of 0.8 kB a frame."""
+    counts = np.zeros((frames, 20, 20), np.uint16)
+    save(
+        path, Recording(np.arange(float(frames)), counts, meta={"labels": labels or {}})
+    )
+
+
 @pytest.fixture
 def little(monkeypatch):
     """Kept touches may take a megabyte."""
@@ -74,7 +82,7 @@ def little(monkeypatch):
 
 def test_the_oldest_go_first(edge, tmp_path, little):
     for i in range(3):
-        (tmp_path / f"kept-20200101T00000{i}-00000.npz").write_bytes(bytes(400_000))
+        save_touch(tmp_path / f"kept-20200101T00000{i}-00000.npz", frames=500)
     mine = tmp_path / "mine.npz"
     mine.write_bytes(bytes(2_000_000))
     assert run(edge, tmp_path, "--keep-if", "all")[0] == 0
@@ -86,10 +94,8 @@ def test_the_oldest_go_first(edge, tmp_path, little):
 
 def after_the_clock_went_back(folder, labels):
     """A touch that was kept by a later clock, of nearly a megabyte."""
-    frames = np.zeros((1200, 20, 20), np.uint16)
-    recording = Recording(np.arange(1200.0), frames, meta={"labels": labels})
     path = folder / "kept-n000041-20990101T000000-000000.npz"
-    save(path, recording)
+    save_touch(path, labels=labels)
     return path
 
 
@@ -107,7 +113,7 @@ def test_labelled_touches_are_never_removed_and_a_full_folder_is_said(
     labelled = after_the_clock_went_back(tmp_path, {"object": "box"})
     _, _, err = run(edge, tmp_path, "--keep-if", "all")
     assert "0 recordings kept" in err
-    assert "touches are no longer kept, as labelled ones fill the 1 MB" in err
+    assert "touches are no longer kept, as labelled or unreadable ones fill the" in err
     assert list(tmp_path.glob("kept-*.npz")) == [labelled]
 
 
@@ -121,8 +127,13 @@ def test_what_cannot_be_removed_ends_neither_the_run_nor_the_keeping(
     edge, tmp_path, little
 ):
     (tmp_path / "kept-20200101T000000-00000.npz").mkdir()
-    (tmp_path / "kept-20200101T000001-00000.npz").write_bytes(bytes(2_000_000))
+    unlabelled = tmp_path / "kept-20200101T000001-00000.npz"
+    save_touch(unlabelled)
+    unreadable = tmp_path / "kept-20200101T000002-00000.npz"
+    unreadable.write_bytes(bytes(500_000))  # it may have been labelled
     status, _, err = run(edge, tmp_path, "--keep-if", "all")
     assert status == 0
     assert "Traceback" not in err
-    assert not (tmp_path / "kept-20200101T000001-00000.npz").exists()
+    assert "1 recording kept" in err
+    assert not unlabelled.exists()
+    assert unreadable.exists()

@@ -63,11 +63,11 @@ def test_a_course_is_in_percent_of_its_highest_and_misses_no_peak(make_touch):
     frames = np.zeros_like(touch.frames)
     frames[7, 2, 3] = 400
     frames[-1, 0, 0] = 100
-    course = review.curve(replace(touch, frames=frames), 10)
-    assert len(course) == 10
+    course = review.curve(replace(touch, frames=frames))
+    assert len(course) == 32
     assert max(course) == 100
     assert course[-1] == 25
-    assert review.curve(replace(touch, frames=0 * frames), 10) == [0] * 10
+    assert review.curve(replace(touch, frames=0 * frames)) == [0] * 32
 
 
 @pytest.mark.parametrize(

@@ -65,8 +65,8 @@ def test_a_category_that_contradicts_softness_and_mobility_is_named():
     right = {"category": "soft-fixed", "softness": "soft", "mobility": "fixed"}
     wrong = {**right, "softness": "rigid"}
     assert slips([right] * 9 + [wrong] * 3)[0] == (
-        "category contradicts softness and mobility on 3 of 12 recordings, such as "
-        "'soft-fixed' beside 'rigid-fixed'"
+        "category='soft-fixed' contradicts softness and mobility, which say "
+        "'rigid-fixed', on 3 of 12 recordings"
     )
 
 
