@@ -553,7 +553,7 @@ function trialRow(trial) {
   add("Delete", `Delete ${trial.file}`, () => remove(files));
   const text = element("div");
   text.append(breaking("strong", labelText(trial.labels) || "no label"));
-  text.append(breaking("div", `${trial.file}, ${trial.seconds.toFixed(2)} s`, "near"));
+  text.append(breaking("div", `${trial.file}, ${trial.seconds.toFixed(2)}\u00a0s`, "near"));
   for (const [task, answer] of decided) text.append(element("div", `${task}: ${answerText(answer)}`, "near"));
   for (const kind of trial.kinds) text.append(element("span", kind, "flag"));
   for (const doubt of trial.doubts) text.append(element("div", doubt, "doubt"));
