@@ -64,11 +64,7 @@ class Product:
 
     def contradiction(self, labels: Labels) -> str:
         """A sentence on a trial whose label of the product is another than that of its
-        factors; empty elsewhere.
-
-        >>> CATEGORY.contradiction({"category": "rigid-fixed", "softness": "soft"})
-        "category='rigid-fixed' contradicts softness and mobility, which say 'soft-fixed'"
-        """
+        factors; empty elsewhere."""
         implied = self.label(self.completed(labels))
         label = labels.get(self.task, implied)
         if implied is None or label == implied:

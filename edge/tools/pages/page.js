@@ -9,8 +9,6 @@ let latest = null;
 let trials = [];
 let version = null;
 let askedAt = 0;
-// So long a message is shown.
-const SHOWN_MS = 60000;
 
 // A text that stays as it is can be selected, and is not read out again.
 function say(id, text) {
@@ -215,13 +213,27 @@ function post(action) {
   }).catch(() => null);
 }
 
-// A text with a button that hides it.
+function button(text, action, label) {
+  const node = element("button", text);
+  node.type = "button";
+  node.onclick = action;
+  if (label) node.setAttribute("aria-label", label);
+  return node;
+}
+
+function field(name, label, action) {
+  const input = element("input");
+  input.placeholder = name;
+  input.maxLength = 80;
+  input.setAttribute("aria-label", label);
+  input.onchange = action;
+  return input;
+}
+
+// A text that goes by a press or after a while.
 function message(node, text, hide) {
-  const button = element("button", "×");
-  button.type = "button";
-  button.setAttribute("aria-label", "hide this message");
-  button.onclick = hide;
-  node.replaceChildren(text, " ", button);
+  node.replaceChildren(text, button("×", hide, "hide this message"));
+  setTimeout(hide, 60000);
   return node;
 }
 
@@ -238,149 +250,118 @@ async function send(action) {
   const failed = !answer || !answer.ok;
   $("error").hidden = !failed;
   if (failed) {
-    const hide = () => { $("error").hidden = true; };
-    message($("error"), (answer && await answer.text()) || "The program did not answer.", hide);
-    setTimeout(hide, SHOWN_MS);
+    const text = answer && await answer.text();
+    message($("error"), text || "The program did not answer.", () => { $("error").hidden = true; });
   }
   return !failed;
 }
 
-// The labels that a task can have: its fixed ones, then those that touches have already.
-function namesOf(task) {
-  const used = trials.map((trial) => trial.labels[task]).filter(Boolean);
-  return [...new Set([...(latest.choices[task] || []), ...used])].slice(0, 30);
+// The tasks of touches.
+function tasksOf(touches) {
+  return touches.flatMap((trial) => [...Object.keys(trial.labels), ...Object.keys(trial.decided)]);
 }
 
-function field(name) {
-  const input = element("input");
-  input.placeholder = name;
-  input.maxLength = 80;
-  return input;
-}
-
-// A task's labels as buttons, beside a field for a new one.
+// A task's labels as buttons, first the fixed ones, then those of touches; and a field for a new one.
 function taskGroup(task, choose) {
   const group = element("fieldset");
   group.dataset.task = task;
   group.append(element("legend", task));
-  for (const name of namesOf(task)) {
-    const button = element("button", name);
-    button.type = "button";
-    button.dataset.label = name;
-    button.onclick = () => choose(task, name);
-    group.append(button);
+  const fixed = latest.choices[task] || [];
+  const used = trials.map((trial) => trial.labels[task]).filter(Boolean);
+  for (const name of new Set([...fixed, ...used])) {
+    const node = button(name, () => choose(task, name));
+    node.dataset.label = name;
+    if (fixed.includes(name)) node.className = "fixed";
+    group.append(node);
   }
-  const input = field("new");
-  input.setAttribute("aria-label", `new label for ${task}`);
-  input.onchange = () => input.value.trim() && choose(task, input.value.trim());
+  const input = field("new", `new label for ${task}`, () => input.value.trim() && choose(task, input.value.trim()));
   group.append(input);
   return group;
 }
 
 // Shows which label is chosen; one without a button stands in the field.
 function mark(group, label) {
-  const buttons = [...group.querySelectorAll("button[data-label]")];
-  for (const button of buttons) button.setAttribute("aria-pressed", button.dataset.label === label);
   const input = group.querySelector("input");
-  const hasButton = buttons.some((button) => button.dataset.label === label);
-  if (input !== document.activeElement) input.value = hasButton ? "" : label || "";
+  let text = label || "";
+  for (const node of group.querySelectorAll("[data-label]")) {
+    node.setAttribute("aria-pressed", node.dataset.label === label);
+    if (node.dataset.label === label) text = "";
+  }
+  if (input !== document.activeElement) input.value = text;
 }
 
-// A folded line with a field for a task and one for its label.
 function newTask(choose) {
   const box = element("details");
-  const [task, label] = ["task", "label"].map((name) => {
-    const input = field(name);
-    input.setAttribute("aria-label", `new ${name}`);
-    return input;
-  });
-  task.onchange = label.onchange = () => {
+  const add = () => {
     if (!task.value.trim() || !label.value.trim()) return;
     choose(task.value.trim(), label.value.trim());
     task.value = label.value = "";
     box.open = false;
   };
+  const task = field("task", "new task", add);
+  const label = field("label", "its label", add);
   box.append(element("summary", "Add a task"), task, " ", label);
   return box;
 }
 
-// The digits press the fixed labels, so that no new label moves a digit to another one.
+// The digits press fixed labels: a new label moves no digit to another one.
 function setDigits(box) {
-  const fixed = [...box.querySelectorAll("button[data-label]")].filter((button) =>
-    (latest.choices[button.parentNode.dataset.task] || []).includes(button.dataset.label));
-  fixed.slice(0, 9).forEach((button, i) => {
-    button.dataset.key = i + 1;
-    button.textContent = `${i + 1} ${button.dataset.label}`;
+  [...box.querySelectorAll(".fixed")].slice(0, 9).forEach((node, i) => {
+    node.dataset.key = i + 1;
+    node.textContent = `${i + 1} ${node.dataset.label}`;
   });
 }
 
-// Labels for touches of the list, which change when they are saved: those of the next touch
-// are not these. There is one such form at a time.
+// A form for the labels of touches in the list, apart from those of the next touch.
 function edit(place, filesOf) {
   document.querySelectorAll(".editor").forEach((other) => other.remove());
-  const files = filesOf();
-  const touched = trials.filter((trial) => files.includes(trial.file));
-  const chosen = {};
+  const touched = trials.filter((trial) => filesOf().includes(trial.file));
+  const labels = {};
+  const groups = {};
   const form = element("form", undefined, "editor");
   const choose = (task, label) => {
-    chosen[task] = label;
-    const group = [...form.querySelectorAll("fieldset")].find((it) => it.dataset.task === task) || add(task);
-    mark(group, label);
+    labels[task] = label;
+    if (!groups[task]) form.prepend(groups[task] = taskGroup(task, choose));
+    mark(groups[task], label);
   };
-  const add = (task) => {
-    const group = taskGroup(task, choose);
-    form.querySelector("details").before(group);
-    return group;
-  };
-  form.append(newTask(choose));
-  const tasks = touched.flatMap((trial) => [...Object.keys(trial.labels), ...Object.keys(trial.decided)]);
-  for (const task of new Set([...Object.keys(latest.choices), ...tasks])) {
-    const labels = new Set(touched.map((trial) => trial.labels[task]));
-    mark(add(task), labels.size === 1 ? [...labels][0] : undefined);
+  for (const task of new Set([...Object.keys(latest.choices), ...tasksOf(touched)])) {
+    const former = new Set(touched.map((trial) => trial.labels[task]));
+    form.append(groups[task] = taskGroup(task, choose));
+    mark(groups[task], former.size === 1 ? [...former][0] : undefined);
   }
   setDigits(form);
   const buttons = element("p", undefined, "buttons");
-  const cancel = element("button", "Cancel");
-  cancel.type = "button";
-  cancel.onclick = () => form.remove();
-  buttons.append(element("button", "Save"), cancel);
-  form.append(buttons);
+  buttons.append(element("button", "Save"), button("Cancel", () => form.remove()));
+  form.append(newTask(choose), buttons);
   form.onsubmit = async (event) => {
     event.preventDefault();
     for (const input of form.querySelectorAll("input")) input.onchange();
-    const labels = { ...chosen };
     if (Object.keys(labels).length && !await act({ do: "relabel", files: filesOf(), labels })) return;
     form.remove();
     if (place === $("ticked")) tickAll(false);
   };
   place.append(form);
   form.querySelector("button, input").focus();
-  form.scrollIntoView({ block: "nearest" });
 }
 
 function labelText(labels) {
   return Object.entries(labels).map(([task, label]) => `${task}=${label}`).join(", ");
 }
 
-// The labels of the next touch, which change here alone; the program's, whichever browser gave them.
+// The labels of the next touch, which change here alone; every browser shows the program's.
 function drawForm(picture) {
   const box = $("choices");
+  const choose = (task, label) => act({ do: "labels", labels: { [task]: label } });
   const tasks = new Set([...Object.keys(picture.choices), ...Object.keys(picture.labels)]);
   if (!tasks.size) tasks.add("object");
-  const shape = JSON.stringify([...tasks].map((task) => [task, namesOf(task)]));
-  const writes = document.activeElement.tagName === "INPUT" && $("labels").contains(document.activeElement);
-  if (box.dataset.shape !== shape && !writes) {
+  const groups = [...tasks].map((task) => taskGroup(task, choose));
+  const shape = groups.map((group) => group.innerHTML).join();
+  if (box.dataset.shape !== shape && !box.querySelector("input:focus, [open]")) {
     box.dataset.shape = shape;
-    const choose = (task, label) => act({ do: "labels", labels: { [task]: label } });
-    const groups = [...tasks].map((task) => {
-      const group = taskGroup(task, choose);
-      const remove = element("button", "−");
-      remove.type = "button";
-      remove.setAttribute("aria-label", `no label for ${task}`);
-      remove.onclick = () => act({ do: "unlabel", task });
-      group.append(remove);
-      return group;
-    });
+    for (const group of groups) {
+      const { task } = group.dataset;
+      group.append(button("−", () => act({ do: "unlabel", task }), `no label for ${task}`));
+    }
     box.replaceChildren(...groups, newTask(choose));
     setDigits(box);
   }
@@ -425,13 +406,11 @@ async function fetchTrials(number) {
 
 function shownTrials() {
   const kind = $("filter").value;
-  const known = (trial) => [...trial.kinds, ...Object.keys(trial.labels), ...Object.keys(trial.decided)];
-  return trials.filter((trial) => kind === "" || known(trial).includes(kind));
+  return trials.filter((trial) => kind === "" || [...trial.kinds, ...tasksOf([trial])].includes(kind));
 }
 
 function drawFilter() {
-  const tasks = trials.flatMap((trial) => [...Object.keys(trial.labels), ...Object.keys(trial.decided)]);
-  const names = ["unsure", "wrong", "unlabelled", ...new Set(tasks)];
+  const names = ["unsure", "wrong", "unlabelled", ...new Set(tasksOf(trials))];
   const text = JSON.stringify(names);
   if ($("filter").dataset.names === text) return;
   const chosen = $("filter").value;
@@ -457,15 +436,10 @@ function answerText(answer) {
 }
 
 function smallCurve(percent) {
-  const svg = document.createElementNS("http://www.w3.org/2000/svg", "svg");
-  svg.setAttribute("viewBox", "0 0 100 100");
-  svg.setAttribute("preserveAspectRatio", "none");
-  svg.setAttribute("role", "img");
-  svg.setAttribute("aria-label", "largest force over time");
-  const line = document.createElementNS("http://www.w3.org/2000/svg", "polyline");
+  const svg = $("small").content.firstElementChild.cloneNode(true);
   const last = Math.max(percent.length - 1, 1);
-  line.setAttribute("points", percent.map((value, i) => `${(100 * i) / last},${100 - value}`).join(" "));
-  svg.append(line);
+  const points = percent.map((value, i) => `${(100 * i) / last},${100 - value}`);
+  svg.firstElementChild.setAttribute("points", points.join(" "));
   return svg;
 }
 
@@ -477,7 +451,7 @@ function breaking(tag, text, className) {
 }
 
 // New touches come last, and a row is made anew only where its touch has changed: nothing moves
-// under the pointer, the focus stays at its button, and what is being written stays.
+// under the pointer, and the focus and what is written stay.
 function drawTrials() {
   drawFilter();
   const list = $("trials");
@@ -539,18 +513,16 @@ function trialRow(trial) {
   tick.setAttribute("aria-label", `tick ${trial.file}`);
   tick.onchange = drawTicked;
   const buttons = element("div", undefined, "buttons");
-  const add = (text, title, action) => {
-    const button = element("button", text);
-    button.title = title;
-    button.onclick = action;
-    buttons.append(button);
-  };
   if (canAccept(trial)) {
-    add("Accept", `Label it ${labelText(trial.accepted)}, as it was decided`, () => act({ do: "accept", files }));
+    const accept = button("Accept", () => act({ do: "accept", files }));
+    accept.title = labelText(trial.accepted);
+    buttons.append(accept);
   }
   const decided = Object.entries(trial.decided);
-  add(decided.length ? "Correct" : "Relabel", "Give it other labels", () => edit(row, () => files));
-  add("Delete", `Delete ${trial.file}`, () => remove(files));
+  buttons.append(
+    button(decided.length ? "Correct" : "Relabel", () => edit(row, () => files)),
+    button("Delete", () => remove(files)),
+  );
   const text = element("div");
   text.append(breaking("strong", labelText(trial.labels) || "no label"));
   text.append(breaking("div", `${trial.file}, ${trial.seconds.toFixed(2)}\u00a0s`, "near"));
@@ -566,24 +538,18 @@ function drawUndo({ undo }) {
   say("undo", `Undo the change of ${undo.length === 1 ? undo[0] : `${undo.length} touches`}`);
 }
 
-// The notices are the last of a stream: those that follow the former ones are new. Each goes after
-// a while, or when a person hides it.
-let formerNotices = [];
+// The notices are a stream's last: new are those that follow the former ones.
+let notices = [];
 
 function drawNotices(picture) {
-  let known = formerNotices;
+  let known = notices;
   while (!known.every((text, i) => text === picture.notices[i])) known = known.slice(1);
   for (const text of picture.notices.slice(known.length)) {
     const notice = element("li");
-    const hide = () => {
-      notice.remove();
-      $("notice-part").hidden = !$("notices").children.length;
-    };
-    $("notices").append(message(notice, text, hide));
-    setTimeout(hide, SHOWN_MS);
-    $("notice-part").hidden = false;
+    $("notices").append(message(notice, text, () => notice.remove()));
   }
-  formerNotices = picture.notices;
+  notices = picture.notices;
+  $("notice-part").hidden = !$("notices").children.length;
 }
 
 function draw(picture) {
@@ -606,7 +572,6 @@ $("all").onchange = () => tickAll($("all").checked);
 $("accept-ticked").onclick = async () => await act({ do: "accept", files: tickedFiles() }) && tickAll(false);
 $("label-ticked").onclick = () => edit($("ticked"), tickedFiles);
 $("delete-ticked").onclick = () => remove(tickedFiles());
-$("labels").onsubmit = (event) => event.preventDefault();
 $("filter").onchange = drawTrials;
 addEventListener("keydown", (event) => {
   const writes = event.target.matches("select, textarea, input:not([type=checkbox])");
