@@ -230,7 +230,6 @@ function field(name, label, action) {
   return input;
 }
 
-// A text that goes by a press or after a while.
 function message(node, text, hide) {
   node.replaceChildren(text, button("×", hide, "hide this message"));
   setTimeout(hide, 60000);
@@ -256,12 +255,11 @@ async function send(action) {
   return !failed;
 }
 
-// The tasks of touches.
 function tasksOf(touches) {
   return touches.flatMap((trial) => [...Object.keys(trial.labels), ...Object.keys(trial.decided)]);
 }
 
-// A task's labels as buttons, first the fixed ones, then those of touches; and a field for a new one.
+// A task's labels as buttons, the fixed ones first, with a field for a new one.
 function taskGroup(task, choose) {
   const group = element("fieldset");
   group.dataset.task = task;
@@ -279,7 +277,6 @@ function taskGroup(task, choose) {
   return group;
 }
 
-// Shows which label is chosen; one without a button stands in the field.
 function mark(group, label) {
   const input = group.querySelector("input");
   let text = label || "";
@@ -392,7 +389,6 @@ function drawRecord(picture) {
   if (picture.trials !== version || late) fetchTrials(picture.trials);
 }
 
-// The list comes when it has changed; a folder that another thread fills is looked at again.
 async function fetchTrials(number) {
   version = number;
   askedAt = performance.now();
@@ -443,7 +439,6 @@ function smallCurve(percent) {
   return svg;
 }
 
-// Text that breaks at hyphens rather than within a word.
 function breaking(tag, text, className) {
   const node = element(tag, undefined, className);
   for (const part of text.split(/(?<=[-_])/)) node.append(part, element("wbr"));
@@ -583,7 +578,6 @@ addEventListener("keydown", (event) => {
 $("record").onclick = () => act({ do: "record", on: !(latest && latest.recording) });
 addEventListener("resize", () => latest && draw(latest));
 
-// A stream of pictures; the browser opens it again by itself where it breaks.
 function watch() {
   const stream = new EventSource("events" + query);
   stream.onmessage = (event) => draw(JSON.parse(event.data));
