@@ -194,7 +194,7 @@ def reasons(text: str) -> tuple[str, ...]:
         InputError: one of them is none.
     """
     names = tuple(text.split(","))
-    if not set(names) <= set(REASONS):
+    if not set(REASONS).issuperset(names):
         raise InputError(
             f"--keep-if takes {', '.join(REASONS)}, separated by commas, not {text!r}"
         )

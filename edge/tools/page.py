@@ -237,9 +237,9 @@ class Page:
 
     def _list(self) -> Json:
         """The trials and the labels of the next one, with what is doubtful about each."""
-        listed = dict(self._trials)  # another thread adds to them
-        trials = [{"file": name, **trial} for name, trial in listed.items()]
-        labels = [trial["labels"] for trial in trials]
+        # Another thread adds to the trials.
+        trials = [{"file": file, **trial} for file, trial in list(self._trials.items())]
+        labels = (trial["labels"] for trial in trials)
         return {"trials": trials, "doubts": doubts([*labels, self.labels])}
 
     def _switch(self, on: bool) -> None:

@@ -84,8 +84,8 @@ def kinds(meta: Mapping[str, Any]) -> list[str]:
     belongs = dict.fromkeys(KINDS, False)
     belongs["unlabelled"] = not labels or not labels.keys() >= decided.keys()
     for task, answer in decided.items():
-        unsure = is_unsure(answer["confidence"]) or UNKNOWN in answer["flags"]
-        belongs["unsure"] |= unsure
+        belongs["unsure"] |= is_unsure(answer["confidence"])
+        belongs["unsure"] |= UNKNOWN in answer["flags"]
         belongs["wrong"] |= labels.get(task, answer["label"]) != answer["label"]
     return [kind for kind in KINDS if belongs[kind]]
 

@@ -55,7 +55,7 @@ def doubts(labels: Labels) -> list[list[str]]:
     sentences = []
     for trial in labels:
         named = [CATEGORY.contradiction(trial), *map(slip.get, trial.items())]
-        sentences.append(list(filter(None, named)))
+        sentences.append([sentence for sentence in named if sentence])
     return sentences
 
 
@@ -100,7 +100,7 @@ def _rare(thing: str, counts: Mapping[str, int], total: int) -> list[str]:
 def _likely(counts: Mapping[str, int]) -> dict[str, str]:
     """{name: the more frequent one that it is probably a slip of}."""
     meant = {name: _meant(name, counts) for name in counts}
-    return {name: other for name, other in meant.items() if other is not None}
+    return {name: other for name, other in meant.items() if other}
 
 
 def _meant(name: str, counts: Mapping[str, int]) -> str | None:

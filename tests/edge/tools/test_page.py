@@ -332,11 +332,11 @@ def test_a_picture_tells_when_the_list_has_changed(folder_page, pictures):
 class View:
     """A page in headless Chromium, whose frames go on while something is waited for."""
 
-    def __init__(self, page, browser, events=()):
+    def __init__(self, page, browser, stream, events):
         self.page = page
         self.browser = browser
+        self.stream = stream
         self.events = events
-        self.stream = frames()
 
     def js(self, expression, *arguments):
         return self.browser.execute_script(f"return {expression}", *arguments)
@@ -365,12 +365,13 @@ class View:
 
 @pytest.fixture
 def view():
-    """Open a page in a window of a width."""
+    """Open a page in a window of a width; all windows show one stream of frames."""
+    stream = frames()
     with ExitStack() as stack:
 
         def run(page, width=390, events=()):
             browser = stack.enter_context(chromium(width, page.server.link))
-            return View(page, browser, events)
+            return View(page, browser, stream, events)
 
         yield run
 
