@@ -1,9 +1,10 @@
 """The chips of one bus: read in every frame, and brought back after a failure.
 
 A failed transaction is sent again as its error's `retries` say. A chip that still fails
-is down; it is tried again at once and then every 0.1 s, or every 0.3 s if it fails again
-within a second of its return, or its bus hangs for long. While a chip is being set up, the others are
-read in every fourth frame, and the time saved goes to it, one transaction at a time.
+is down; it is tried again at once and then every 0.1 s, or every 0.3 s if it fails
+again within a second of its return, or its bus hangs for long. While a chip is being
+set up, the others are read in every fourth frame, and the time saved goes to it, one
+transaction at a time.
 """
 
 import math

@@ -62,25 +62,22 @@ class Recordings:
         recordings = tuple(r for r in self.recordings if "simulation" not in r.meta)
         return recordings or self.recordings
 
-    @property
-    def joints(self) -> bool:
-        """Whether most of the owner's have joint angles."""
-        return bool(np.mean([r.joints is not None for r in self.of_owner]) > 0.5)
-
-    @property
-    def shear(self) -> bool:
-        """Whether most of the owner's have shear."""
-        return bool(np.mean([r.shear is not None for r in self.of_owner]) > 0.5)
+    def mostly_have(self, part: str) -> bool:
+        """Whether most of the owner's have `joints` or `shear`."""
+        has = [getattr(recording, part) is not None for recording in self.of_owner]
+        return bool(np.mean(has) > 0.5)
 
     def split(self, part: str) -> tuple[Recordings, tuple[Path, ...]]:
         """The recordings that have `joints` or `shear`, and the files of the others."""
         has = [getattr(recording, part) is not None for recording in self.recordings]
-        with_part = replace(
-            self,
-            paths=tuple(compress(self.paths, has)),
-            recordings=tuple(compress(self.recordings, has)),
+        return self.part(has), tuple(compress(self.paths, map(not_, has)))
+
+    def part(self, kept: Sequence[bool]) -> Recordings:
+        """Some of them, by a mask (n,)."""
+        paths = tuple(compress(self.paths, kept))
+        return replace(
+            self, paths=paths, recordings=tuple(compress(self.recordings, kept))
         )
-        return with_part, tuple(compress(self.paths, map(not_, has)))
 
 
 @dataclass(frozen=True)
@@ -233,16 +230,10 @@ def read(data: Sequence[str | Path], *, progress: bool = False) -> Recordings:
         raise InputError("no recordings given; name .npz files or a folder of them")
     digest = hashlib.sha256()
     recordings: list[Recording] = []
-    bad: list[str] = []
     for path in bar(paths, desc="reading", unit=" trials", disable=not progress):
-        try:
-            contents = read_bytes(path, LARGEST_BYTES)
-            recordings.append(load(path, io.BytesIO(contents)))
-            digest.update(contents)
-        except InputError as error:
-            bad.append(str(error))
-    if bad:
-        raise InputError(bad[0])
+        contents = read_bytes(path, LARGEST_BYTES)
+        recordings.append(load(path, io.BytesIO(contents)))
+        digest.update(contents)
     return Recordings(tuple(paths), tuple(recordings), digest.hexdigest())
 
 
@@ -401,7 +392,7 @@ def with_poses(data: Recordings, measurement: Measurement) -> Posed:
         InputError: the recordings have several arms.
     """
     without: tuple[Path, ...] = ()
-    if data.joints and (measurement.of_joints or measurement.moves):
+    if data.mostly_have("joints") and (measurement.of_joints or measurement.moves):
         data, without = data.split("joints")
     named: list[Named] = []
     arms: list[Chain | None] = []
