@@ -39,7 +39,12 @@ from train.data.feature_sets import axes, moves, unit
 from train.data.kernels import MOST_TOUCHES, kernel_table
 from train.data.labels import shared_tasks
 from train.data.vectors import Labels, Strings, Vectors
-from train.progress import bar
+from train.progress import bar, say
+
+MANY = 2000
+"""Recordings from which on a fit says before it begins how much it will take."""
+A_MINUTE = 1000
+"""Recordings that a quick fit takes in a minute of a processor of 2020."""
 
 
 @dataclass(frozen=True)
@@ -228,6 +233,12 @@ def read(data: Sequence[str | Path], *, progress: bool = False) -> Recordings:
     paths = find([str(path) for path in data])
     if not paths:
         raise InputError("no recordings given; name .npz files or a folder of them")
+    if progress and len(paths) >= MANY:
+        gigabytes = 2e-9 * sum(path.stat().st_size for path in paths)
+        say(
+            f"{len(paths)} recordings take about {gigabytes:.1f} GB of memory and, with "
+            f"--quick, {len(paths) // A_MINUTE} minutes of a processor, else many times that"
+        )
     digest = hashlib.sha256()
     recordings: list[Recording] = []
     for path in bar(paths, desc="reading", unit=" trials", disable=not progress):
