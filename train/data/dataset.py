@@ -444,6 +444,5 @@ def _dead(recordings: Sequence[Recording]) -> tuple[int, ...]:
     for recording in recordings:
         if recording.frames.shape[1:] != shape or recording.valid is None:
             return ()
-        valid = recording.valid
-        alive |= valid if valid.ndim == 2 else valid.any(axis=0)
+        alive |= recording.valid.reshape(-1, *shape).any(axis=0)
     return tuple(np.flatnonzero(~alive).tolist())

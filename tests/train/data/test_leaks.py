@@ -25,12 +25,7 @@ def few(recordings, tmp_path):
 def test_copies_of_recordings_are_left_out_and_named(few):
     shutil.copy(few / "hard_0.npz", few / "hard_9.npz")
     unique, (note,) = without_copies(read([few]))
-    assert [path.stem for path in unique.paths] == [
-        "hard_0",
-        "hard_1",
-        "soft_0",
-        "soft_1",
-    ]
+    assert few / "hard_9.npz" not in unique.paths
     assert len(unique.recordings) == 4
     assert "1 of 5 recordings are copies" in note
     assert f"such as {few / 'hard_9.npz'} of {few / 'hard_0.npz'};" in note
