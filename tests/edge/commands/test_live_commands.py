@@ -27,14 +27,13 @@ def test_scan_over_the_fake_maps_the_whole_skin(edge, quiet):
     assert err.count("|" + "#" * 24 + "|") == 16
 
 
-@pytest.mark.parametrize("name", ["cody", "mpr121"])
-def test_scan_counts_taxels_that_were_touched_when_they_were_calibrated(name):
-    file = calibrated(skinfile.load(skinfile.shipped(name)))
+def test_scan_counts_taxels_that_were_touched_when_they_were_calibrated():
+    file = calibrated(skinfile.load(skinfile.shipped("mpr121")))
     clock = VirtualClock()
     silence = np.zeros(file.layout.shape, np.uint16)
     buses = fake_buses(file, lambda t: silence, clock)
     touched = file.calibration.baseline.astype(np.int32)
-    touched.flat[:7] += 100 * file.chips[0].sign
+    touched.flat[:7] -= 100
     calibration = replace(file.calibration, baseline=touched)
     with Skin(replace(file, calibration=calibration), buses, clock=clock) as skin:
         skin.start()
