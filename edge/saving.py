@@ -273,11 +273,11 @@ def change_all(changes: Mapping[Path, Labels | None]) -> None:
     for path in changes:
         change = of_folder.setdefault(path.parent, Change())
         change.labels[path.name] = load(path).labels, changes[path]
-    for folder in of_folder:
+    for folder, change in of_folder.items():
         with refusing(f"{folder}: its recordings cannot be changed"):
             (folder / UNDO).unlink(missing_ok=True)
             shutil.rmtree(folder / DELETED, ignore_errors=True)
-            if None in changes.values():
+            if any(after is None for _, after in change.labels.values()):
                 (folder / DELETED).mkdir()
     _begin(of_folder)
 

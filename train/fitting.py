@@ -21,7 +21,7 @@ from train.choose.settings import Chosen, Settings
 from train.choose.windows import windows_of
 from train.data.dataset import DataSet, read
 from train.data.groups import TRIAL, are_drawn
-from train.data.leaks import copies, leaks
+from train.data.leaks import leaks, without_copies
 from train.data.tasks import labels_of_tasks, lacking
 from train.data.vectors import Labels, Vectors
 from train.model.pipeline import Choice, ContactClassifier
@@ -173,12 +173,12 @@ def load(
     if isinstance(data, DataSet):
         return Loaded(data, windows, [])
     paths = [data] if isinstance(data, str | Path) else data
-    recordings = read(paths, progress=options.progress)
+    recordings, notes = without_copies(read(paths, progress=options.progress))
     if options.fixed_window_s is None and not options.quick:
         seconds = [float(r.t[-1] - r.t[0]) for r in recordings.recordings]
         windows = windows_of(seconds)
     loaded = trials_of(recordings, windows, options)
-    return replace(loaded, notes=[*copies(recordings), *loaded.notes])
+    return replace(loaded, notes=[*notes, *loaded.notes])
 
 
 def choose(loaded: Loaded, y: Labels, options: FitOptions) -> Settings:

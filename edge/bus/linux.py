@@ -103,12 +103,11 @@ class LinuxBus:
                 I2C_TIMEOUT,
                 max(1, math.ceil(self.timeout_s * 100.0 - 1e-9)),
             )
-        except BlockingIOError:
-            remedy = "another program is using the bus; end it first"
-            smbus.close()
-            raise bus_error(errno.EBUSY, self.name, remedy=remedy) from None
         except OSError as error:
             smbus.close()
+            if isinstance(error, BlockingIOError):
+                remedy = "another program is using the bus; end it first"
+                raise bus_error(errno.EBUSY, self.name, remedy=remedy) from None
             raise bus_error(error.errno, self.name) from None
         self._smbus = smbus
         self._fd = smbus.fd

@@ -15,11 +15,17 @@ from edge.bus.protocol import Bus, fetch, read, send, write
 from edge.chips.chip import Chip, ChipSpec, Defaults, Parsed, Traits
 
 STAGES = 12
+FRAME_BYTES = 2 * STAGES + 2
+"""Bytes of the results and of the identity, which follows them."""
+IDENTIFIED_EVERY = 16
+"""The identity is read in every so many frames."""
 STAGE_REGISTERS = 8
 SYSTEM = 0x00
 STATUS = 0x08
 RESULTS = 0x0B
 DEVICE_ID = 0x17
+IDENTITY = 0x147
+"""Of the device id; the last digit is the chip's revision."""
 STAGE_BANK = 0x80
 REST = 20946
 """Cody's real skin rests there."""
@@ -94,20 +100,23 @@ class AD7147(Chip):
         bus: Bus,
         address: int,
         *,
-        into: Bytes | int = 2 * STAGES,
+        into: Bytes | int = FRAME_BYTES,
     ) -> None:
         """Identify the chip.
 
         Args:
             bus: a bus or a mux's channel.
             address: 0x2C to 0x2F.
-            into: (24,) bytes that `read` fills; new ones where it is a number.
+            into: (26,) bytes that `read` fills; new ones where it is a number.
 
         Raises:
             WrongChip: the identity register does not read 0x147x.
             BusError: the chip does not answer.
         """
         super().__init__(bus, address, into=into)
+        results = read(address, self.frame.buffer[:-2])
+        bare = bus.prepare(write(address, self.frame_pointer), results)
+        self._frames = cycle([self.frame] + [bare] * (IDENTIFIED_EVERY - 1))
         checks = []
         for register, values in CHECK_ROWS:
             pointer = write(address, words((register,)))
@@ -115,7 +124,7 @@ class AD7147(Chip):
             checks.append((words(values), bus.prepare(pointer, row)))
         self._checks = cycle(checks)
         identity = int.from_bytes(fetch(bus, address, words((DEVICE_ID,)), 2), "big")
-        if identity & 0xFFF0 != 0x1470:
+        if identity >> 4 != IDENTITY:
             raise self.wrong(
                 f"not an AD7147: its identity reads {identity:#06x}, not 0x147x"
             )
@@ -124,7 +133,7 @@ class AD7147(Chip):
     def traits(taxels: int, options: Mapping[str, int]) -> Traits:
         """A word of 16 bits for each stage; 0xFFFF is the end of its range."""
         defaults = Defaults(threshold_counts=40, onset_counts=60)
-        return Traits(2 * STAGES, highest=0xFFFE, rest=REST, defaults=defaults)
+        return Traits(FRAME_BYTES, highest=0xFFFE, rest=REST, defaults=defaults)
 
     @staticmethod
     def parse(data: Bytes, spec: ChipSpec) -> Parsed:
@@ -132,19 +141,21 @@ class AD7147(Chip):
 
         No converting stage reads 0: a chip without settings serves it, or converts stage 0
         alone. Words of 0xFFFF up to the end of a frame come from a bus that nothing drives
-        any more; the word before them is damaged too where it ends in 0xFF.
+        any more; the word before them is damaged too where it ends in 0xFF. A chip with
+        another identity gives no value.
 
         Args:
-            data: (n, 24) bytes.
+            data: (n, 26) bytes.
 
         Returns:
             (n, 12) values and which of them are intact.
         """
-        values = data.view(">u2").astype(np.uint16)
-        intact = values != 0
+        registers = data.view(">u2").astype(np.uint16)
+        values = registers[:, :-1]
+        intact = (values != 0) & (registers[:, -1:] >> 4 == IDENTITY)
         intact[:, 0] &= intact[:, 1:].any(axis=1)
         for row in np.flatnonzero(values[:, -1] == 0xFFFF).tolist():
-            driven = np.flatnonzero(data[row] != 0xFF)
+            driven = np.flatnonzero(data[row, :-2] != 0xFF)
             intact[row, (int(driven[-1]) + 1 if driven.size else 0) // 2 :] = False
         return values, intact
 
@@ -175,7 +186,8 @@ class AD7147(Chip):
         return prepared.buffer.tobytes() == expected
 
     def read(self) -> None:
-        """Read all taxels, and once more where the last byte is 0xFF.
+        """Read all taxels, now and then with the identity, and once more where the last
+        byte is 0xFF.
 
         Such a byte may be a value, or a transfer that broke off before it; the words
         carry no check that could tell. A burst during which a conversion ends mixes
@@ -183,6 +195,7 @@ class AD7147(Chip):
         first would not prevent that, since a conversion may end after it. That a single
         word is never mixed is assumed; the data sheet does not say.
         """
-        self.bus.transfer(self.frame)
-        if self.frame.buffer[-1] == 0xFF:
-            self.bus.transfer(self.frame)
+        transfer = next(self._frames)
+        self.bus.transfer(transfer)
+        if transfer.buffer[-1] == 0xFF:
+            self.bus.transfer(transfer)

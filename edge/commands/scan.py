@@ -2,7 +2,8 @@
 
 Sets up every chip, reads some frames, and prints each chip's state and a map of the
 skin: # is a taxel with a valid value, . one without, and a blank one without a chip.
-The exit status is 1 if a chip does not answer or a taxel has no valid value.
+The exit status is 1 if a chip does not answer or a taxel has no valid value. Taxels
+that rest below their calibration are counted: something may have touched them then.
 """
 
 import argparse
@@ -11,10 +12,10 @@ import numpy as np
 
 from edge.arrays import Booleans
 from edge.commands.options import add_skin
-from edge.commands.output import Output
+from edge.commands.output import LOG, Output, counted
 from edge.commands.source import chip_event, open_skin
 from edge.skin.loop import Loop
-from edge.skin.skin import ChipStatus
+from edge.skin.skin import ChipStatus, Skin
 
 FRAMES = 30
 """A microcontroller that hangs serves the same frame over and over, which shows after
@@ -34,6 +35,14 @@ def skin_map(served: list[int], invalid: Booleans) -> str:
     return "\n".join(f"{i:3} |{''.join(row)}|" for i, row in enumerate(marks.tolist()))
 
 
+def below_rest(skin: Skin) -> int:
+    """The number of taxels that rest below their calibration by the threshold, which no
+    touch does."""
+    raw, valid = skin.raw()
+    below = skin.baseline.change(raw.ravel()) < -skin.layout.threshold_counts
+    return int((below & valid.ravel()).sum())
+
+
 def run(arguments: argparse.Namespace) -> int:
     """Print each chip and the map; 1 if a chip is silent or a taxel is not valid."""
     output = Output.of(arguments)
@@ -42,6 +51,7 @@ def run(arguments: argparse.Namespace) -> int:
         for _ in Loop(skin, lasts_s=FRAMES * skin.period_s).frames():
             pass
         invalid = skin.invalid_for > 0
+        below = below_rest(skin) if skin.file.calibration else 0
         statuses = skin.status()
     silent = 0
     for status in statuses:
@@ -54,6 +64,11 @@ def run(arguments: argparse.Namespace) -> int:
     if invalid.any():
         answer += f"; {SILENT}: {invalid.sum()}"
     output.text(answer)
+    if below:
+        LOG.warning(
+            f"{counted(below, 'taxel')} below the rest value of the calibration: if "
+            "something touched the skin then, calibrate again with nothing on it"
+        )
     return 1 if silent or invalid.any() else 0
 
 

@@ -225,6 +225,8 @@ def _contradictions_of_tasks(info: ModelInfo) -> Iterator[str]:
                 f"task {name!r} has {task.components} components of {info.width} "
                 "features"
             )
+        if task.features != tuple(f for f in info.features if f in task.features):
+            yield f"task {name!r} takes other features, or in another order"
     labels = {name: task.labels for name, task in info.tasks.items()}
     for name, factors in info.products.items():
         from edge.model.agreement import factors_fit  # few models have products

@@ -1,9 +1,10 @@
 """The chips of one bus: read in every frame, and brought back after a failure.
 
 A failed transaction is sent again as its error's `retries` say. A chip that still fails
-is down; it is tried again at once and then every 0.1 s, or every 0.3 s if it hangs or
-fails again within a second of its return. While a chip is being set up, the others are
-read in every fourth frame, and the time saved goes to it, one transaction at a time.
+is down; it is tried again at once and then every 0.1 s, or every 0.3 s if it fails
+again within a second of its return, or its bus hangs for long. While a chip is being
+set up, the others are read in every fourth frame, and the time saved goes to it, one
+transaction at a time.
 """
 
 import math
@@ -33,7 +34,9 @@ PAUSE_S = 0.1
 after a fault's end."""
 LONG_PAUSE_S = 0.3
 """The same for a chip that failed again soon, and from a timeout to the next attempt on
-its bus."""
+a bus that hangs for long."""
+MANY_TIMEOUTS = 8
+"""A bus hangs for long after so many timeouts without a chip that came back."""
 FLAPS_S = 1.0
 """A chip that fails again within this time of its return is not tried again at once."""
 LONGEST_PAUSE_S = 1.0
@@ -167,8 +170,9 @@ class BusReader:
         self._reading = reading
         self._muxes: dict[int, TCA9548A] = {}
         self._frame = 0
-        self._turn = 0
         self._timeouts = 0
+        self._hangs = 0
+        """Timeouts since a chip came back."""
         self._rest_until = -math.inf
         """No chip is brought back before this time."""
         self._lost_at = math.inf
@@ -294,9 +298,9 @@ class BusReader:
     def _recheck(self) -> None:
         """Check the settings of the next running chip, where one is due."""
         running = [slot for slot in self.slots if slot.running]
-        if running and self._frame % self._reading.recheck_frames == 0:
-            self._turn += 1
-            self._check(running[self._turn % len(running)])
+        turn, other_frames = divmod(self._frame, self._reading.recheck_frames)
+        if running and not other_frames:
+            self._check(running[turn % len(running)])
 
     def _check(self, slot: Slot) -> None:
         """Set a running chip up again if it has lost its settings."""
@@ -313,7 +317,9 @@ class BusReader:
             mux.forget()
         if isinstance(error, BusTimeout):
             self._timeouts += 1
-            self._rest_until = now + LONG_PAUSE_S
+            self._hangs += 1
+            lasts = self._hangs > MANY_TIMEOUTS
+            self._rest_until = now + (LONG_PAUSE_S if lasts else PAUSE_S)
         gone = isinstance(error, BusGone)
         if gone:
             self.bus.close()
@@ -328,10 +334,9 @@ class BusReader:
 
     def _bring_back(self, deadline: float) -> None:
         """Bring chips back, the longest waiting first, until the deadline."""
-        due = [slot for slot in self.slots if self._is_due(slot)]
+        due = sorted(filter(self._is_due, self.slots), key=lambda slot: slot.retry_at)
         if not due or self._rests() or not self._reachable():
             return
-        due.sort(key=lambda slot: slot.retry_at)
         self._step(due[0])
         for slot in due:
             while self._is_due(slot):
@@ -367,6 +372,7 @@ class BusReader:
             next(slot.steps)
         except StopIteration:
             slot.run(self.bus.now())
+            self._hangs = 0
             self._lost_at = math.inf
             self._reopen_at = -math.inf
         except BusError as error:

@@ -256,9 +256,13 @@ class Baseline:
         """(n,) raw counts of the baseline."""
         return (self._now + (1 << (SCALE_BITS - 1))) >> SCALE_BITS
 
+    def change(self, raw: Counts) -> NDArray[np.int32]:
+        """Counts above the baseline (n,), negative below it."""
+        return (raw.astype(np.int32) - self.counts) * self._sign
+
     def above(self, raw: Counts) -> Counts:
         """Counts above the baseline (n,), 0 to 65535, by sign and dead band."""
-        counts = (raw.astype(np.int32) - self.counts) * self._sign
+        counts = self.change(raw)
         counts *= counts >= self._dead
         return np.asarray(np.minimum(counts, 65535), dtype=np.uint16)
 

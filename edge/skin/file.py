@@ -160,15 +160,18 @@ def _signal(table: ConfigTable, layout: SkinLayout, defaults: Defaults) -> Signa
     dead = table.get("dead", [])
     if not isinstance(dead, list):
         raise table.fail("dead", "a list of [row, col]")
-    rate = defaults.drift_counts_per_s
-    limit = defaults.drift_limit_counts
-    band = defaults.dead_band_counts
     counts = range(65536)
     signal = Signal(
         dead_band_sigma=table.number("dead_band_sigma", 6.0, 0.0, 100.0),
-        dead_band_counts=table.whole("dead_band_counts", band, counts),
-        drift_counts_per_s=table.number("drift_counts_per_s", rate, 0.0, 65535.0),
-        drift_limit_counts=table.whole("drift_limit_counts", limit, counts),
+        dead_band_counts=table.whole(
+            "dead_band_counts", defaults.dead_band_counts, counts
+        ),
+        drift_counts_per_s=table.number(
+            "drift_counts_per_s", defaults.drift_counts_per_s, 0.0, 65535.0
+        ),
+        drift_limit_counts=table.whole(
+            "drift_limit_counts", defaults.drift_limit_counts, counts
+        ),
         settle_s=table.number("settle_s", 0.5, 0.0, 60.0),
         saturation_counts=table.whole("saturation_counts", 65535, counts[1:]),
         dead=tuple(taxel_at(table, "dead", entry, layout) for entry in dead),

@@ -52,7 +52,11 @@ def read_buses(
 
 def _bus(table: ConfigTable, layout: SkinLayout, sign: int | None) -> BusSpec:
     serial = table.has("serial")
-    device, clock_hz = _port(table) if serial else _adapter(table)
+    if serial:
+        device = table.text("serial")
+        clock_hz = table.whole("baud", 115_200, range(1_200, 20_000_001))
+    else:
+        device, clock_hz = _adapter(table)
     chips = table.tables("chips", f"{table.prefix.rstrip(': ')} chip")
     if serial and len(chips) > 1:
         raise InputError(
@@ -70,12 +74,6 @@ def _shared(chip: ConfigTable, bus: ConfigTable, keys: Sequence[str]) -> ConfigT
     """A chip's table with the keys that its bus gives for all chips."""
     shared = {key: bus.raw[key] for key in keys if key in bus.raw}
     return ConfigTable({**shared, **chip.raw}, chip.where, chip.prefix)
-
-
-def _port(table: ConfigTable) -> tuple[str, int]:
-    """A serial port and its bits per second."""
-    baud = table.whole("baud", 115_200, range(1_200, 20_000_001))
-    return table.text("serial"), baud
 
 
 def _adapter(table: ConfigTable) -> tuple[str, int]:

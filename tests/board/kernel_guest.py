@@ -36,8 +36,8 @@ from tests.faulty import Fault, faulty_buses
 SKINS = Path(os.environ["SKINS"])
 SYSTEM = SKINS.parent / "system"
 PERIOD_S = 0.1
-CHIP_BYTES = 24
-"""Bytes in which both kinds of chip serve their 12 taxels."""
+CHIP_BYTES = (24, 26)
+"""Bytes in which both kinds of chip serve their 12 taxels, and one with its identity."""
 CHIP = 0x5A
 OTHER_CHIP = 0x5B
 ABSENT = 0x5C
@@ -73,8 +73,8 @@ class Adapter(UsbAdapter):
         """Answer a request; the last chip's reading of a frame is followed by the next
         frame."""
         answer = super().control(setup, data)
-        self._readings += len(answer) == CHIP_BYTES
-        if len(answer) == CHIP_BYTES and self._readings % self._chips == 0:
+        self._readings += len(answer) in CHIP_BYTES
+        if len(answer) in CHIP_BYTES and self._readings % self._chips == 0:
             self.bus.sleep(PERIOD_S)
             if self.bus.now() > self._interrupt_s - 0.5 * PERIOD_S:
                 self._interrupt_s = math.inf
@@ -220,7 +220,7 @@ def test_a_transfer_fails_with_its_error_and_the_next_is_carried(
     if isinstance(fault, int):
         pad.adapter.bus.inject([Fault(code=fault, at=[0])])
     with pytest.raises(error):
-        fetch(bus, address, b"\x04", CHIP_BYTES)
+        fetch(bus, address, b"\x04", CHIP_BYTES[0])
     pad.adapter.short = False
     assert fetch(bus, CHIP, CONFIGURATION, 1) == EXPECTED
 

@@ -11,7 +11,7 @@ import pytest
 from edge import saving
 from edge.errors import InputError
 from edge.recording import Recording, load
-from edge.saving import JOURNAL, alone, change_all, find, save, take_back
+from edge.saving import DELETED, JOURNAL, alone, change_all, find, save, take_back
 from tests.edge.killed import dies
 
 
@@ -110,6 +110,14 @@ def test_a_deletion_is_finished_though_the_folder_of_deleted_ones_is_gone(new_da
     assert find([str(day)]) == [day / "b.npz"]
     undo([day])
     assert find([str(day)]) == [day / "a.npz", day / "b.npz"]
+
+
+def test_only_folders_with_a_deletion_get_a_folder_of_deleted_ones(new_days):
+    monday, tuesday = new_days()
+    with alone([monday, tuesday]):
+        change_all({monday / "a.npz": None, tuesday / "a.npz": {"object": "cup"}})
+    assert (monday / DELETED).is_dir()
+    assert not (tuesday / DELETED).exists()
 
 
 @pytest.mark.parametrize("words", [["--set", "object=cup", "--yes"], ["--undo"]])

@@ -116,8 +116,8 @@ def trials_of(
     usual = candidates(
         {},
         options,
-        joints=recordings.joints,
-        shear=recordings.shear,
+        joints=recordings.mostly_have("joints"),
+        shear=recordings.mostly_have("shear"),
         drawn=kinds_of(recordings.recordings) is not None,
         quick=options.quick,
     )

@@ -39,7 +39,12 @@ from train.data.feature_sets import axes, moves, unit
 from train.data.kernels import MOST_TOUCHES, kernel_table
 from train.data.labels import shared_tasks
 from train.data.vectors import Labels, Strings, Vectors
-from train.progress import bar
+from train.progress import bar, say
+
+MANY = 2000
+"""Recordings from which on a fit says before it begins how much it will take."""
+A_MINUTE = 1000
+"""Recordings that a quick fit takes in a minute of a processor of 2020."""
 
 
 @dataclass(frozen=True)
@@ -62,25 +67,22 @@ class Recordings:
         recordings = tuple(r for r in self.recordings if "simulation" not in r.meta)
         return recordings or self.recordings
 
-    @property
-    def joints(self) -> bool:
-        """Whether most of the owner's have joint angles."""
-        return bool(np.mean([r.joints is not None for r in self.of_owner]) > 0.5)
-
-    @property
-    def shear(self) -> bool:
-        """Whether most of the owner's have shear."""
-        return bool(np.mean([r.shear is not None for r in self.of_owner]) > 0.5)
+    def mostly_have(self, part: str) -> bool:
+        """Whether most of the owner's have `joints` or `shear`."""
+        has = [getattr(recording, part) is not None for recording in self.of_owner]
+        return bool(np.mean(has) > 0.5)
 
     def split(self, part: str) -> tuple[Recordings, tuple[Path, ...]]:
         """The recordings that have `joints` or `shear`, and the files of the others."""
         has = [getattr(recording, part) is not None for recording in self.recordings]
-        with_part = replace(
-            self,
-            paths=tuple(compress(self.paths, has)),
-            recordings=tuple(compress(self.recordings, has)),
+        return self.part(has), tuple(compress(self.paths, map(not_, has)))
+
+    def part(self, kept: Sequence[bool]) -> Recordings:
+        """Some of them, by a mask (n,)."""
+        paths = tuple(compress(self.paths, kept))
+        return replace(
+            self, paths=paths, recordings=tuple(compress(self.recordings, kept))
         )
-        return with_part, tuple(compress(self.paths, map(not_, has)))
 
 
 @dataclass(frozen=True)
@@ -231,6 +233,12 @@ def read(data: Sequence[str | Path], *, progress: bool = False) -> Recordings:
     paths = find([str(path) for path in data])
     if not paths:
         raise InputError("no recordings given; name .npz files or a folder of them")
+    if progress and len(paths) >= MANY:
+        gigabytes = 2e-9 * sum(path.stat().st_size for path in paths)
+        say(
+            f"{len(paths)} recordings take about {gigabytes:.1f} GB of memory and, with "
+            f"--quick, {len(paths) // A_MINUTE} minutes of a processor, else many times that"
+        )
     digest = hashlib.sha256()
     recordings: list[Recording] = []
     for path in bar(paths, desc="reading", unit=" trials", disable=not progress):
@@ -395,7 +403,7 @@ def with_poses(data: Recordings, measurement: Measurement) -> Posed:
         InputError: the recordings have several arms.
     """
     without: tuple[Path, ...] = ()
-    if data.joints and (measurement.of_joints or measurement.moves):
+    if data.mostly_have("joints") and (measurement.of_joints or measurement.moves):
         data, without = data.split("joints")
     named: list[Named] = []
     arms: list[Chain | None] = []
@@ -436,6 +444,5 @@ def _dead(recordings: Sequence[Recording]) -> tuple[int, ...]:
     for recording in recordings:
         if recording.frames.shape[1:] != shape or recording.valid is None:
             return ()
-        valid = recording.valid
-        alive |= valid if valid.ndim == 2 else valid.any(axis=0)
+        alive |= recording.valid.reshape(-1, *shape).any(axis=0)
     return tuple(np.flatnonzero(~alive).tolist())

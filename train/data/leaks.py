@@ -19,25 +19,26 @@ LEAK = 0.5
 more than this share of the remainder."""
 
 
-def copies(recordings: Recordings) -> list[str]:
-    """A warning where some recordings are others' copies, by which they are told."""
+def without_copies(recordings: Recordings) -> tuple[Recordings, list[str]]:
+    """Recordings without others' copies, by which they would be told, and a warning
+    where there are some."""
     originals: dict[bytes, Path] = {}
     copied = []
+    kept = []
     for path, recording in zip(recordings.paths, recordings.recordings, strict=True):
         sha = hashlib.sha256(recording.t.tobytes())
         sha.update(recording.frames.tobytes())
-        original = originals.get(sha.digest())
-        if original is None:
-            originals[sha.digest()] = path
-        elif recording.frames.any():
+        original = originals.setdefault(sha.digest(), path)
+        kept.append(original is path or not recording.frames.any())
+        if not kept[-1]:
             copied.append(f"{path} of {original}")
     if not copied:
-        return []
-    return [
-        f"warning: {len(copied)} of {len(recordings.paths)} recordings are copies, such "
-        f"as {copied[0]}; a copy is told by its original, so the accuracy is too high: "
-        "leave copies out"
-    ]
+        return recordings, []
+    warning = (
+        f"warning: {len(copied)} of {len(kept)} recordings are copies, such as "
+        f"{copied[0]}; they are left out, as a copy is told by its original"
+    )
+    return recordings.part(kept), [warning]
 
 
 def is_late(trial: Trial) -> bool:

@@ -81,7 +81,8 @@ class Curve:
             probabilities = shifted.probabilities(margins, excess) * known
             return float(probabilities.mean()) - target
 
-        reach = 50.0 + abs(self.slope) * float(np.abs(margins).max(initial=0.0))
+        logits = self.slope * margins + self.intercept - self.doubt * excess
+        reach = 50.0 + float(np.abs(logits).max(initial=0.0))
         shift = float(brentq(surplus, -reach, reach))
         return replace(self, intercept=self.intercept + shift)
 

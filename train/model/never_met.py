@@ -19,20 +19,20 @@ from edge.arrays import Booleans, Floats, Integers
 from edge.model.info import Remoteness
 from train.data.folds import group_folds
 from train.data.vectors import Strings
-from train.model.novelty import UNKNOWN_RATE, limits_of
+from train.model.novelty import LEAST, UNKNOWN_RATE, limits_of
 
 SHARE = 0.05
 """Share of contacts with things that were never met."""
 FEWEST_THINGS = 5
 """Where there are fewer, what remains of a fold says little of the model."""
 MOST_FOLDS = 10
+TINY = 1e-300
 USUAL_SLOPE = 4.0
 USUAL_MIDDLE = 2.2
 """The curve where nothing can be left out, with its middle over the typical score: about
 that of simulated and of real things."""
 LEAST_SLOPE = 0.5
 """So that the middle is no power out of reach."""
-TINY = 1e-300
 PULL = 10.0
 """Inverse of the prior's weight, as scikit-learn's `C`."""
 SURE = 0.9
@@ -74,7 +74,7 @@ def known_of(remoteness: Remoteness, scores: Floats) -> Floats:
 def _curve(known: Floats, left_out: Floats) -> tuple[float, float]:
     """Middle and slope of a decision point, by the remoteness of contacts (n,) and
     (m,)."""
-    logs = np.log(np.maximum(np.concatenate([known, left_out]), TINY))
+    logs = np.log(np.maximum(np.concatenate([known, left_out]), LEAST))
     is_known = np.arange(len(logs)) < len(known)
     ratio = SHARE / (1.0 - SHARE) * len(known) / len(left_out)
     weights = np.where(is_known, 1.0, ratio)

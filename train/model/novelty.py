@@ -43,6 +43,8 @@ UNKNOWN_RATE = 0.01
 """Shares of contacts with trained things that may be flagged."""
 BESIDE = 0.25
 """Weight of directions that tell no labels apart, a power of two."""
+LEAST = 1e-3
+"""Scores below this, as of copies, count as much."""
 TAIL = 0.1
 FOLDS = 20
 """Folds of the held-out scores: more than a choice has, as a space of fewer trials finds
@@ -321,7 +323,7 @@ def limits_of(scores: Floats, rate: float) -> tuple[tuple[float, ...], ...]:
         scores: (decision points, n) of held-out trials.
         rate: at most a tenth.
     """
-    logs = np.log(np.maximum(scores, 1e-300))
+    logs = np.log(np.maximum(scores, LEAST))
     tails = np.quantile(logs, 1.0 - TAIL, axis=1)
     limits = []
     for row, tail in zip(logs, tails.tolist(), strict=True):

@@ -245,7 +245,11 @@ class SequentialClassifier:
             vectors.columns,
             self.jobs,
         )
-        tested = scores.part(folds >= 0)
+        # A copy of another trial says nothing of how far new ones lie.
+        counted = scores.novelty.min(axis=0) > 0.0
+        if counted.sum() < FEWEST:
+            counted = folds >= 0
+        tested = scores.part(counted)
         self.novelty_ = Novelty(*limits_of(tested.novelty, UNUSUAL_RATE))
         self._excess = excess_of(self.novelty_, scores.novelty)
         self._things = thing_folds(np.where(folds >= 0, labels, ""))

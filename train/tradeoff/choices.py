@@ -79,7 +79,11 @@ def followed(
     """
     are_drawn = kinds_of(raw.recordings) is not None
     usual = candidates(
-        {}, joints=raw.joints, shear=raw.shear, drawn=are_drawn, quick=quick
+        {},
+        joints=raw.mostly_have("joints"),
+        shear=raw.mostly_have("shear"),
+        drawn=are_drawn,
+        quick=quick,
     )
     measurement = Measurement(
         expand([*features_of(usual), *features]),

@@ -10,6 +10,7 @@ from edge.fake.ad7147 import FakeAD7147
 from edge.fake.bus import FakeBus
 from tests.edge.chips.chips import parsed, sense
 
+IDENTITY = 0x14, 0x72
 SPEC = ChipSpec(AD7147, 0x2C, tuple(range(12)))
 
 
@@ -51,7 +52,8 @@ def test_a_row_fits_the_buffer_of_a_cp2112():
 
 
 def test_parses_big_endian_words_of_which_zeros_are_not_intact():
-    data = np.zeros((2, 24), dtype=np.uint8)
+    data = np.zeros((2, 26), dtype=np.uint8)
+    data[:, -2:] = IDENTITY
     data[0, :4] = 0x12, 0x34, 0x56, 0x78
     values, intact = AD7147.parse(data, SPEC)
     assert values[0, :3].tolist() == [0x1234, 0x5678, 0]
@@ -60,7 +62,8 @@ def test_parses_big_endian_words_of_which_zeros_are_not_intact():
 
 def test_ones_up_to_the_end_are_a_bus_that_nobody_drives_and_ones_before_it_a_value():
     for driven in range(24):  # bytes that came before the transfer broke off
-        data = np.full((1, 24), 0xFF, dtype=np.uint8)
+        data = np.full((1, 26), 0xFF, dtype=np.uint8)
+        data[:, -2:] = IDENTITY
         data[0, :driven] = 0x51
         # A last byte alone may be a value that ends in 0xFF: its chip is read a second
         # time.
@@ -68,7 +71,7 @@ def test_ones_up_to_the_end_are_a_bus_that_nobody_drives_and_ones_before_it_a_va
         assert AD7147.parse(data, SPEC)[1][0].tolist() == [
             i < intact for i in range(12)
         ]
-    data[:] = 0x51
+    data[:, :-2] = 0x51
     data[0, 4:6] = 0xFF
     assert AD7147.parse(data, SPEC)[1].all()
 

@@ -2,15 +2,21 @@
 
 import json
 import signal
+from dataclasses import replace
 from types import SimpleNamespace
 
+import numpy as np
 import pytest
 
 from edge import recording, saving
 from edge.commands import source
+from edge.commands.scan import below_rest
+from edge.fake.clock import VirtualClock
+from edge.fake.player import calibrated, fake_buses
 from edge.fake.touches import still
 from edge.skin import file as skinfile
 from edge.skin.loop import Stop
+from edge.skin.skin import Skin
 from tests.conftest import decided, lines, python
 
 
@@ -19,6 +25,20 @@ def test_scan_over_the_fake_maps_the_whole_skin(edge, quiet):
     assert status == 0
     assert [e["state"] for e in events] == ["running"] * 32
     assert err.count("|" + "#" * 24 + "|") == 16
+
+
+def test_scan_counts_taxels_that_were_touched_when_they_were_calibrated():
+    file = calibrated(skinfile.load(skinfile.shipped("mpr121")))
+    clock = VirtualClock()
+    silence = np.zeros(file.layout.shape, np.uint16)
+    buses = fake_buses(file, lambda t: silence, clock)
+    touched = file.calibration.baseline.astype(np.int32)
+    touched.flat[:7] -= 100
+    calibration = replace(file.calibration, baseline=touched)
+    with Skin(replace(file, calibration=calibration), buses, clock=clock) as skin:
+        skin.start()
+        skin.read()
+        assert below_rest(skin) == 7
 
 
 def test_a_microcontroller_that_hangs_with_an_intact_frame_is_heard_of(

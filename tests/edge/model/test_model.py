@@ -180,6 +180,9 @@ REFUSED = {
     meta(
         units={"max_force": "newton"}
     ): "units.contact_area is missing; export it again",
+    edited(
+        lambda m: m["features"].reverse()
+    ): "task 'category' takes other features, or in another order",
     meta(speeds=[0.3]): "speeds must be a list of 2 numbers",
     meta(trials=["a"]): "names 1 of 16 trials",
     edited(

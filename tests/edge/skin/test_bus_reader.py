@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from edge.bus.protocol import BusRefused, bus_error
+from edge.chips.ad7147 import DEVICE_ID, IDENTIFIED_EVERY
 from edge.fake.clock import VirtualClock
 from edge.fake.player import calibrated
 from edge.skin.bus_reader import (
@@ -149,6 +150,19 @@ def test_a_damaged_stage_register_is_found_by_reading_the_stages_in_turn(running
     assert model.registers[0x81] == 0x1FFF
 
 
+def test_another_chip_at_an_address_gives_no_value_from_the_next_look_at_its_identity(
+    running,
+):
+    skin, model, slot = running
+    taxels = list(slot.spec.taxels)
+    model.registers[DEVICE_ID] = 0x1492
+    valid = [skin.read().valid.flat[taxels].any() for _ in range(IDENTIFIED_EVERY)]
+    assert not valid[-1]
+    for _ in range(SET_UP_AFTER + 1):
+        assert not skin.read().valid.flat[taxels].any()
+    assert "its identity reads 0x1492, not 0x147x" in str(slot.error)
+
+
 def test_a_chip_that_keeps_its_settings_but_converts_nothing_is_set_up_again_now_and_then(
     running,
 ):
@@ -166,7 +180,7 @@ def test_an_adapter_that_refuses_the_drivers_transactions_is_an_error_at_the_sta
     clock = VirtualClock()
     refused = [Fault(code=errno.EOPNOTSUPP)]
     buses = faulty_buses(SMALL, lambda t: QUIET, clock, faults=refused)
-    rows = [np.zeros(24, np.uint8)] * 4
+    rows = [np.zeros(26, np.uint8)] * 4
     with pytest.raises(BusRefused, match="refuses a transaction of this shape"):
         BusReader(buses[0], SMALL.buses[0], rows, SMALL.reading).start()
 
@@ -202,6 +216,23 @@ def test_a_chip_that_fails_again_and_again_is_tried_every_0_3_s():
     assert heard[0] == "down"
     assert heard[-1] == "running"
     assert len(heard) <= 2 * 3.0 / LONG_PAUSE_S + 2
+
+
+@pytest.mark.parametrize(
+    ("timeouts", "within_s", "most"), [(range(5), 0.6, 5), (range(9999), 3.1, 16)]
+)
+def test_a_few_timeouts_are_tried_again_at_once_and_a_bus_that_hangs_seldom(
+    timeouts, within_s, most
+):
+    hangs = [Fault(code=errno.ETIMEDOUT, at=timeouts)]
+    with faulty_skin(SMALL, Pattern(SMALL), timed=True) as skin:
+        bus = skin.readers[0].bus
+        start = skin.clock.now()
+        bus.inject(hangs)
+        frames = list(Loop(skin, lasts_s=3.0).frames())
+    last = max(frame.t for frame in frames if not frame.valid.all())
+    assert last - start < within_s
+    assert bus.met <= most
 
 
 def test_a_chip_that_cannot_send_a_frame_is_heard_of_once():

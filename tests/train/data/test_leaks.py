@@ -8,8 +8,9 @@ import pytest
 
 from edge.recording import Recording
 from edge.saving import save
+from train.data import dataset
 from train.data.dataset import read
-from train.data.leaks import copies, leaks
+from train.data.leaks import leaks, without_copies
 
 
 @pytest.fixture
@@ -20,18 +21,30 @@ def few(recordings, tmp_path):
     return tmp_path
 
 
-def test_recordings_that_are_there_twice_are_named(few):
+def test_copies_of_recordings_are_left_out_and_named(few):
     shutil.copy(few / "hard_0.npz", few / "hard_9.npz")
-    (note,) = copies(read([few]))
+    unique, (note,) = without_copies(read([few]))
+    assert few / "hard_9.npz" not in unique.paths
+    assert len(unique.recordings) == 4
     assert "1 of 5 recordings are copies" in note
     assert f"such as {few / 'hard_9.npz'} of {few / 'hard_0.npz'};" in note
+
+
+def test_what_a_fit_of_many_recordings_takes_is_said_before_they_are_read(
+    few, monkeypatch, capsys
+):
+    monkeypatch.setattr(dataset, "MANY", 4)
+    read([few], progress=True)
+    assert "4 recordings take about 0.0 GB of memory" in capsys.readouterr().out
 
 
 def test_recordings_of_nothing_are_no_copies(few, make_touch):
     nothing = make_touch(seconds=0.0, labels={"category": "none", "object": "hard 0"})
     for name in ("none_0", "none_1"):
         save(few / f"{name}.npz", nothing)
-    assert copies(read([few])) == []
+    unique, notes = without_copies(read([few]))
+    assert len(unique.paths) == 6
+    assert notes == []
 
 
 LABELS = np.array(["a", "b"] * 10)

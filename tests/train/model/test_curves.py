@@ -78,3 +78,10 @@ def test_the_mean_probability_is_moved_to_a_share(share):
     assert curve.doubt == 1.0
     expected = min(max(share, 0.5 / 200), 1.0 - 0.5 / 200)
     assert curve.probabilities(margins, excess).mean() == pytest.approx(expected)
+
+
+def test_a_mean_may_lie_beyond_the_greatest_doubt():
+    excess = np.repeat([0.0, 690.0], 50)
+    level = np.zeros(100)
+    curve = Curve(1.0, 0.0, 1.0).with_mean(level, excess, 0.7, np.ones(100))
+    assert curve.probabilities(level, excess).mean() == pytest.approx(0.7)

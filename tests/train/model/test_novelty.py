@@ -10,6 +10,7 @@ from train.data.folds import stratified_folds
 from train.model.novelty import (
     CLIP,
     FARTHEST,
+    LEAST,
     MOST_COMPONENTS,
     STEP_BITS,
     NoveltySpace,
@@ -159,6 +160,11 @@ def test_limits_lie_in_the_exponential_tail_of_the_logarithms():
     tail = np.quantile(np.log(scores), 0.9)
     excess = np.log(scores[np.log(scores) >= tail]).mean() - tail
     assert limits[0] == pytest.approx(math.exp(tail + excess * math.log(0.1 / 0.02)))
+
+
+def test_where_all_trials_are_copies_anything_else_is_beyond_the_limit():
+    typical, limits = limits_of(np.zeros((1, 40)), 0.02)
+    assert typical == limits == (pytest.approx(LEAST),)
 
 
 def test_few_trials_have_few_components():

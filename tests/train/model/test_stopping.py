@@ -109,6 +109,16 @@ def test_each_fold_is_answered_by_what_was_chosen_without_it():
     assert not right[folds == 0].all()
 
 
+def test_trials_that_are_copies_set_no_limit():
+    X, labels = touches(60)
+    kept = [*range(60), *range(40)]
+    copied = calibrated(of_neighbours(3), X[:, kept], {"t": labels[kept]})
+    single = calibrated(of_neighbours(3), X, {"t": labels})
+    ratio = np.divide(copied.novelty_.typical, single.novelty_.typical)
+    assert ratio.min() > 0.3
+    assert ratio.max() < 3.0
+
+
 def test_a_held_out_trial_is_never_its_own_neighbour():
     X, labels = touches(60)
     model = calibrated(of_neighbours(1), X, {"t": labels})
