@@ -18,14 +18,8 @@ from edge.errors import InputError, about
 from edge.files import parsing, read_bytes
 from train.importers.columns import TIME
 from train.importers.options import TableOptions
-from train.importers.reading import (
-    EMPTY,
-    LARGEST_BYTES,
-    Table,
-    needs,
-    numbered,
-    require_unique,
-)
+from train.importers.reading import LARGEST_BYTES
+from train.importers.tables import EMPTY, Table, needs, numbered, require_unique
 
 SUFFIXES = (".npy", ".npz", ".mat", ".h5", ".hdf5")
 MOST_VALUES = 1 << 25

@@ -16,7 +16,7 @@ from edge.config import short_text
 from edge.errors import InputError
 from train.importers.axes import lettered
 from train.importers.options import UNITS_S, TableOptions
-from train.importers.reading import Table, numbered, numbers_of, require_converted
+from train.importers.tables import Table, numbered, numbers_of, require_converted
 
 OTHER_UNITS = {"sec": "s", "seconds": "s", "µs": "us"}
 """{another name of a unit: its name here}."""

@@ -10,8 +10,7 @@ import re
 import warnings
 import zipfile
 from array import array
-from collections import Counter, defaultdict
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence, Set
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from functools import cached_property
@@ -24,11 +23,10 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from edge.commands.output import counted
-from edge.config import short_text
 from edge.errors import InputError, about
 from edge.files import parsing, read_bytes
+from train.importers.tables import EMPTY, Table, needs, numbered, require_unique
 
-EMPTY = "holds no values; leave it out or save it again"
 LARGEST_BYTES = 1 << 29
 TEXTS = (".csv", ".tsv", ".txt", ".dat")
 UNPACKERS: dict[str, Callable[..., Any]] = {
@@ -50,77 +48,8 @@ FEWEST_THOUSANDS = 3
 LOOKED_AT = 2000
 """Rows that are looked at for such numbers."""
 LONGEST_LINE = 4 << 20
-
-
-@dataclass(frozen=True)
-class Table:
-    """The columns of a file, or those of one trial in it.
-
-    Attributes:
-        where: names the file, and the trial in it, in errors.
-        data: a column for each; columns without a header are named "1", "2" and so on.
-            Its index is called `line`, and counts the lines of a text, or `row`.
-        named: the file has a header.
-        decimal: the sign before a fraction, in cells that are text.
-        shape: of the skin, where the file tells it.
-        form: how the file was read, where that is worth saying.
-        file_names: the names of all columns of the file, in its order, where they are
-            not those of `data`.
-    """
-
-    where: str
-    data: pd.DataFrame
-    named: bool = True
-    decimal: str = "."
-    shape: tuple[int, ...] = ()
-    form: tuple[str, ...] = ()
-    file_names: tuple[str, ...] = ()
-
-    def __post_init__(self) -> None:
-        if self.data.index.name is None:
-            self.data.index = pd.RangeIndex(1, len(self.data) + 1, name="row")
-
-    @property
-    def names(self) -> list[str]:
-        """The names of the columns, as they stand."""
-        return list(self.data.columns)
-
-    @property
-    def arrays(self) -> dict[str, list[str]]:
-        """The columns of each array: names that are alike up to their last dot."""
-        arrays: dict[str, list[str]] = defaultdict(list)
-        for name in self.names:
-            arrays[name.rpartition(".")[0]].append(name)
-        return arrays
-
-    def numbers(self, names: Iterable[str]) -> NDArray[np.float64]:
-        """(rows, names) the numbers of some columns, as `numbers_of`."""
-        return np.column_stack([numbers_of(self, name) for name in names])
-
-    def values(self, taxels: Sequence[str]) -> NDArray[np.float64]:
-        """(rows, taxels) the values of some taxels."""
-        return self.numbers(taxels)
-
-
-@contextmanager
-def needs(package: str, action: str) -> Iterator[None]:
-    """Name the package to install if an import in the block fails.
-
-    Raises:
-        InputError: it fails; the sentence begins with the `action`.
-    """
-    try:
-        yield
-    except ImportError:
-        raise InputError(
-            f"{action} needs {package}; install it with `pip install {package}`"
-        ) from None
-
-
-def numbered(stem: str, count: int) -> list[str]:
-    """The names of columns without a header, or of those of an array: STEM.1, STEM.2
-    and so on."""
-    return [f"{stem}.{number}".strip(".") for number in range(1, count + 1)]
+UNNAMED = re.compile(r"Unnamed: \d+")
+"""What pandas calls a column without a name."""
 
 
 def inner(path: Path) -> Path:
@@ -142,6 +71,7 @@ class _Text:
         numbers: the line in the file of each row.
         mark: the separator; empty for blanks.
         rows: the cells of the first row, and of the second if there is one.
+        empty: the places of the columns without a name or a value.
         comment: the last comment before the first row; empty without one.
         form: how it was encoded, if not as UTF-8.
     """
@@ -150,6 +80,7 @@ class _Text:
     numbers: Sequence[int]
     mark: str
     rows: list[list[str]]
+    empty: Set[int]
     comment: str
     form: list[str]
 
@@ -196,6 +127,12 @@ class _Header:
             names[self.names.index("")] = ""
         return names
 
+    def filled(self, text: _Text) -> list[int]:
+        """The places of the columns that have a name or a value."""
+        # Without a header, a sign at the ends of the rows makes an empty column.
+        names = self.names if self.named else [*self.names[:-1], ""]
+        return [i for i, name in enumerate(names) if name or i not in text.empty]
+
 
 def read_text(path: Path) -> Table:
     """The table in a text file."""
@@ -220,7 +157,7 @@ def read_labels(path: Path) -> pd.DataFrame:
     """The columns of a text file with a header; each cell is text as it stands."""
     with _opened(path) as text:
         header = _header(text)
-        return _named(_texts(text, header, range(len(header.names))), header)
+        return _named(_texts(text, header, header.filled(text)), header)
 
 
 def read_frame(path: Path) -> NDArray[np.float64]:
@@ -267,7 +204,18 @@ def _text(data: bytes) -> _Text:
     body = "\n".join(chosen_lines)
     numbers = _lines_of_rows(chosen_lines, numbers, mark)
     rows = [row for _, row in islice(_rows(chosen_lines, mark), 2)]
-    return _Text(body, numbers, mark, rows, "".join(comments[-1:]), form)
+    empty = _empty(chosen_lines, mark)
+    return _Text(body, numbers, mark, rows, empty, "".join(comments[-1:]), form)
+
+
+def _empty(lines: list[str], mark: str) -> Set[int]:
+    """The places of the columns without a name or a value."""
+    rows = _rows(lines, mark)
+    _, heading = next(rows)
+    empty = [i for i, name in enumerate(_names(heading)) if not name]
+    while empty and (row := next(rows, None)):
+        empty = [i for i in empty if not row[1][i].strip()]
+    return set(empty)
 
 
 def _lines_of_rows(kept: list[str], numbers: Sequence[int], mark: str) -> Sequence[int]:
@@ -310,7 +258,7 @@ def _rows(lines: list[str], mark: str) -> Iterator[tuple[int, list[str]]]:
 
 def _names(cells: list[str]) -> list[str]:
     """The cells of a row as names."""
-    return [cell.strip().strip('"') for cell in cells]
+    return [UNNAMED.sub("", cell.strip().strip('"')) for cell in cells]
 
 
 def _without_names(text: _Text) -> _Header:
@@ -379,11 +327,11 @@ def _parsed(text: _Text, header: _Header) -> pd.DataFrame:
     with warnings.catch_warnings():
         # Columns that hold texts in a part of a long table are read anew below.
         warnings.simplefilter("ignore", pd.errors.DtypeWarning)
-        table = _cells(text, header, decimal=text.decimal)
-    dtypes = list(table.dtypes)
+        filled = header.filled(text)
+        table = _cells(text, header, usecols=filled, decimal=text.decimal)
     altered = []
-    for i, name in enumerate(header.names):
-        if name != "trial" and pd.api.types.is_numeric_dtype(dtypes[i]):
+    for i, dtype in table.dtypes.items():
+        if header.names[i] != "trial" and pd.api.types.is_numeric_dtype(dtype):
             continue
         # A word such as `NA` is no string any more, nor is a number beyond measure.
         is_text = pd.api.types.infer_dtype(table[i]) == "string"
@@ -418,15 +366,9 @@ def _cells(text: _Text, header: _Header, **options: Any) -> pd.DataFrame:
 
 
 def _named(table: pd.DataFrame, header: _Header) -> pd.DataFrame:
-    """The columns by their names, without those that have neither a name nor a
-    value."""
-    # Without a header, a sign at the ends of the rows makes an empty column.
-    last = len(header.names) - (not header.named)
-    filled = [
-        i for i in table if (header.names[i] and i < last) or table[i].notna().any()
-    ]
+    """The columns by their names instead of their places."""
     unique = header.unique
-    return table[filled].set_axis([unique[i] for i in filled], axis=1)
+    return table.set_axis([unique[i] for i in table], axis=1)
 
 
 def _unpacked(suffix: str, data: bytes) -> bytes:
@@ -475,67 +417,3 @@ def read_parquet(path: Path) -> Table:
     if not isinstance(data.index, pd.RangeIndex):
         data = data.reset_index()
     return Table(str(path), data.rename(columns=str))
-
-
-def place_of(mask: pd.Series) -> str:
-    """The first row of a table that a mask names, in words."""
-    return f"{mask.index.name} {mask.idxmax()}"
-
-
-def numbers_of(table: Table, name: str) -> pd.Series:
-    """A column as numbers; empty cells are NaN.
-
-    Raises:
-        InputError: a cell is no number.
-    """
-    column = table.data[name]
-    if table.decimal == "," and not pd.api.types.is_numeric_dtype(column):
-        column = column.str.replace(",", ".", n=1)
-    numbers = pd.to_numeric(column, errors="coerce").astype("float64")
-    infinite = np.isinf(numbers)
-    if infinite.any():
-        raise InputError(
-            f"{table.where}: column {name} has a number beyond measure in "
-            f"{place_of(infinite)}; fix or delete it"
-        )
-    require_converted(table, name, numbers, "no number")
-    return numbers
-
-
-def require_converted(table: Table, name: str, converted: pd.Series, kind: str) -> None:
-    """Refuse a column of which a filled cell could not be converted.
-
-    Raises:
-        InputError: there is one; the sentence says that it is of that kind.
-    """
-    column = table.data[name]
-    bad = converted.isna() & column.notna()
-    if bad.any():
-        cell = str(column[bad].iloc[0])
-        raise InputError(
-            f"{table.where}: {short_text(cell)} in column {name} is {kind} ({place_of(bad)})"
-        )
-
-
-def require_unique(names: Iterable[str]) -> None:
-    """Refuse a table with two columns of one name.
-
-    Raises:
-        InputError: two are named alike.
-    """
-    for name, count in Counter(names).items():
-        if count > 1:
-            raise InputError(f"two columns are named {name}; rename one of them")
-
-
-def require_filled(path: object, data: pd.DataFrame, name: str) -> None:
-    """Refuse a table with an empty cell in a column that tells its rows apart.
-
-    Raises:
-        InputError: a cell is empty; the sentence names its line.
-    """
-    empty = data[name].isna()
-    if empty.any():
-        raise InputError(
-            f"{path}: {place_of(empty)} has no {name}; enter it, or leave the row out"
-        )

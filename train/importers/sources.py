@@ -20,16 +20,14 @@ from train.importers.columns import columns, is_date, named_times
 from train.importers.options import TableOptions
 from train.importers.reading import (
     TEXTS,
-    Table,
     inner,
-    numbered,
     read_frame,
     read_labels,
     read_parquet,
     read_text,
-    require_filled,
     suffix_of,
 )
+from train.importers.tables import Table, numbered, require_filled
 
 LABELS = "labels.csv"
 SKIN = "skin.json"

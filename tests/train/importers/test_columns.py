@@ -7,7 +7,7 @@ import pytest
 from edge.errors import InputError
 from train.importers.columns import meaning, times_of
 from train.importers.options import TableOptions
-from train.importers.reading import Table
+from train.importers.tables import Table
 
 COUNTS = np.arange(5)
 

@@ -11,7 +11,8 @@ import pytest
 
 from edge.errors import InputError
 from train.importers import reading
-from train.importers.reading import numbers_of, read_frame, read_parquet, read_text
+from train.importers.reading import read_frame, read_parquet, read_text
+from train.importers.tables import numbers_of
 
 PLAIN = "t,p1,p2\n0,1,2\n0.01,3,4\n"
 ROWS = [[0.0, 1.0, 2.0], [0.01, 3.0, 4.0]]
