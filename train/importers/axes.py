@@ -87,6 +87,11 @@ class Parted(Table):
     whole: Table
     axes: pd.DataFrame
 
+    @property
+    def candidates(self) -> list[str]:
+        """The names of the taxels that have three axes."""
+        return list(self.axes.index)
+
     def values(self, names: Sequence[str]) -> NDArray[np.float64]:
         """(n, taxels, 3) values x, y and z of some taxels.
 

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from edge.commands.output import counted
 from edge.errors import InputError
+from edge.touch.layout import RELEASE_S
 from train.progress import say
 
 JITTER_STEPS = 0.5
@@ -36,7 +37,8 @@ class Order:
 
     Attributes:
         kept: (m,) indices of the frames.
-        text: the change that was made, in words; empty for times that increase.
+        text: the change that was made, and steps as of a sparse log, in words; empty
+            for times that increase steadily.
     """
 
     kept: NDArray[np.intp]
@@ -88,6 +90,13 @@ def order(
             "time, or fix the times"
         )
     changes = []
+    shortest_s = float(np.quantile(forward, 0.1)) if len(forward) else 0.0
+    longest_s = float(steps.max(initial=0.0))
+    if longest_s > max(RELEASE_S, GAP_STEPS * shortest_s):
+        changes.append(
+            f"its steps are {shortest_s:.3g} to {longest_s:.3g} s, as of a log that pauses "
+            "or writes on change alone"
+        )
     swapped = int((steps < 0.0).sum())
     if swapped:
         changes.append(f"{counted(swapped, 'time')} went back within the jitter")

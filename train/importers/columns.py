@@ -26,7 +26,8 @@ TIME = re.compile(
     re.IGNORECASE,
 )
 """Names of a column of times, with its unit if they tell it."""
-ISO = re.compile(r"\d{4}-\d\d-\d\d[T ]\d\d:\d\d")
+DATE = re.compile(r"(?a)(?:[\d./-]+[T ] *)?\d\d?:\d\d")
+"""How a time of the day begins, with a date before it or without one."""
 RUNNING = (
     r"\A(?P<stem>.*?)(?P<first>\d{1,9})"
     r"(?:(?:[_x]|, ?|\]\[)(?P<second>\d{1,9}))?\]?\Z"
@@ -194,11 +195,11 @@ def named_times(table: Table, joints: Sequence[str] = ()) -> list[str]:
 
 
 def is_date(table: Table, name: str) -> bool:
-    """Whether a column holds dates with times."""
+    """Whether a column holds times of the day, with dates or without."""
     column = table.data[name]
     if pd.api.types.is_numeric_dtype(column) or column.isna().any():
         return False
-    return bool(ISO.match(str(column.iloc[0])))
+    return bool(DATE.match(str(column.iloc[0])))
 
 
 def _taxels(
@@ -217,7 +218,10 @@ def _taxels(
         raise InputError(
             f"{table.where}: no column is left for taxels beside the time and the joints"
         )
-    return _running(table, rest) if table.named else (rest, ())
+    if not table.named:
+        return rest, ()
+    candidates = set(table.candidates)
+    return _running(table, list(filter(candidates.__contains__, rest)))
 
 
 def _running(table: Table, rest: Sequence[str]) -> tuple[list[str], tuple[int, ...]]:
@@ -234,9 +238,10 @@ def _running(table: Table, rest: Sequence[str]) -> tuple[list[str], tuple[int, .
         )
     if not grids:
         three = ", or --axes xyz for taxels of three axes" * any(map(lettered, rest))
+        numbered = ",".join(name for name in rest if re.match(RUNNING, name))
         raise InputError(
-            f"{table.where}: no columns are named as taxels, such as s1 to s16; name them "
-            f"by --taxels{three}, among {short_text(list(rest))}"
+            f"{table.where}: no columns are named as taxels, such as s1 to s16 without a "
+            f"gap; give --taxels {numbered or 'COLS'}{three}, among {short_text(list(rest))}"
         )
     return grids[0]
 
@@ -274,7 +279,7 @@ def _unit(
     name = TIME.fullmatch(time)
     unit = options.time_unit or (name["unit"] if name else None)
     if unit == "iso" or (unit is None and is_date(table, time)):
-        return "iso", "ISO dates"
+        return "iso", "times of the day"
     if unit is None:
         return _likely_unit(table, time)
     unit = unit.lower()
@@ -314,8 +319,8 @@ def times_of(
         return np.asarray(np.arange(len(table.data)) / rate_hz)
     if meaning.unit == "iso":
         column = table.data[meaning.time]
-        dates = pd.to_datetime(column, errors="coerce", format="ISO8601", utc=True)
-        require_converted(table, meaning.time, dates, "no ISO date")
+        dates = pd.to_datetime(column, errors="coerce", format="mixed", utc=True)
+        require_converted(table, meaning.time, dates, "no time of the day")
         seconds = (dates - dates.iloc[0]).dt.total_seconds()
     else:
         numbers = numbers_of(table, meaning.time)

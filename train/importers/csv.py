@@ -44,6 +44,18 @@ FEWEST_ROWS = 8
 """Rows of a trial from which on a column is seen to count them."""
 FEWEST_ALONE = 3
 """Trials that may all have another label."""
+FIRST_WORDS = (
+    "this line, run in their folder, takes the first word of each name: (echo trial,%s; "
+    'for f in *_*; do echo "${f%%.*},${f%%%%_*}"; done) > labels.csv'
+)
+PANDAS = """\
+Where no option helps, five lines of pandas make a recording of a table:
+import edge, pandas
+table = pandas.read_csv("cup_1.csv")  # sep=";", decimal=",", thousands="."
+frames = table[["s1", "s2"]].round().astype(int).to_numpy()  # from 0 to 65535
+meta = {"skin": {"rows": 1, "cols": frames.shape[1]}, "labels": {"object": "cup"}}
+edge.save("cup_1.npz", edge.Recording(table["t"].to_numpy(), frames, meta=meta))"""
+"""What is printed where no table is clear."""
 add_options = add_table_options
 
 
@@ -96,6 +108,8 @@ def _recorded(
     """The recordings of trials; prints what was taken."""
     usable = [trial for trial in alike if isinstance(trial, Measured)]
     if not usable:
+        for line in PANDAS.splitlines():
+            say(line)
         yield from (result for result in alike if isinstance(result, Refused))
         return
     folder = path if path.is_dir() else path.parent
@@ -133,7 +147,7 @@ def _announced(
     if options.axes is not None:
         say(options.axes.text)
     if len({str(trial.labels) for trial in usable}) == len(usable) > FEWEST_ALONE:
-        say("each trial has a label of its own; a labels.csv beside them gives others")
+        say(f"each trial has a label of its own; {FIRST_WORDS % options.task}")
     return shape
 
 

@@ -34,6 +34,10 @@ SKIN = "skin.json"
 SUFFIXES = (*TEXTS, ".parquet", *arrays.SUFFIXES)
 NUMBERED = re.compile(r"(?:trial|rec|recording|run|take|sample|test)?[\s_.-]*\d+", re.I)
 """Names of folders that only count trials."""
+TAXEL = re.compile(
+    r"(?:taxel|sensor|channel|electrode|cell)(?:[ _]?(?:id|no|nr|number|index))?", re.I
+)
+"""Names of the column beside `value` that tells the taxel."""
 SPARSEST = 64
 """Cells for each value of a long table; more would be nearly empty."""
 Before = TypeVar("Before")
@@ -237,11 +241,14 @@ def _of_file(
             table = arrays.table_of(str(file), stored, options)
     else:
         table = read_parquet(file) if suffix == ".parquet" else read_text(file)
-    if "trial" in table.names:
-        with parsing(str(file), "a table of trials"):
+    taxels = list(filter(TAXEL.fullmatch, table.names))
+    if "value" in table.names and len(taxels) == 1:
+        table = replace(table, data=table.data.rename(columns={taxels[0]: "taxel"}))
+    with parsing(str(file), "a table of trials"):
+        if "trial" in table.names:
             yield from _trials_in(table, options)
-    else:
-        yield Source(_name(file, folder), table)
+        else:
+            yield Source(_name(file, folder), _wide(table, options))
 
 
 def _name(file: Path, folder: Path) -> str:
@@ -314,8 +321,7 @@ def _frame(file: Path) -> NDArray[np.float64]:
 
 def _trials_in(table: Table, options: TableOptions) -> Iterator[Source | Refused]:
     """The trials of a long table."""
-    for name in {"trial", "taxel"} & set(table.names):
-        require_filled(table.where, table.data, name)
+    require_filled(table.where, table.data, "trial")
     tasks = _tasks_in(table, options.task)
     label = f"column {', column '.join(tasks)}" if tasks else "none"
 
@@ -326,9 +332,7 @@ def _trials_in(table: Table, options: TableOptions) -> Iterator[Source | Refused
         data = rows.drop(columns=["trial", *tasks])
         names = tuple(table.names)
         part = replace(table, where=where, data=data, file_names=names)
-        if "taxel" in data:
-            part = _pivoted(part, options.time)
-        return Source(str(name), part, labels, label)
+        return Source(str(name), _wide(part, options), labels, label)
 
     trials = table.data.groupby("trial", sort=False)
     return tried(trials, source, options.strict)
@@ -369,11 +373,14 @@ def _labels_in(where: str, rows: pd.DataFrame) -> dict[str, str]:
     return labels
 
 
-def _pivoted(table: Table, time_terms: str | None) -> Table:
-    """A row for each time and a column for each taxel, of a table with a row for each
+def _wide(table: Table, options: TableOptions) -> Table:
+    """A row for each time and a column for each taxel, where a table has a row for each
     value."""
+    if not {"taxel", "value"} <= set(table.names):
+        return table
+    require_filled(table.where, table.data, "taxel")
     further = [name for name in table.names if name not in ("taxel", "value")]
-    time = _time_of_long(table, further, time_terms)
+    time = _time_of_long(table, further, options.time)
     _check_long(table, time)
     wide = table.data.pivot(index=time, columns="taxel", values="value")
     wide = wide[sorted(wide.columns, key=_natural)].rename(columns=_plain)
@@ -399,10 +406,9 @@ def _time_of_long(
     times = named_times(table) or further
     if terms:
         times = columns(table, terms)
-    if "value" not in table.data or len(times) != 1:
+    if len(times) != 1:
         raise InputError(
-            f"{table.where}: needs the columns value and a time beside taxel, which "
-            "--time names"
+            f"{table.where}: needs a time beside taxel and value, which --time names"
         )
     return times[0]
 
@@ -415,7 +421,7 @@ def _check_long(table: Table, time: str) -> None:
         row = repeated.iloc[0]
         raise InputError(
             f"{table.where} has two values of taxel {_plain(row['taxel'])} at time "
-            f"{row[time]}"
+            f"{row[time]}; a column trial would tell trials apart"
         )
     cells = data[time].nunique() * data["taxel"].nunique()
     if cells > SPARSEST * len(data):

@@ -50,6 +50,11 @@ class Table:
         return list(self.data.columns)
 
     @property
+    def candidates(self) -> list[str]:
+        """The names of the columns that may be taxels."""
+        return self.names
+
+    @property
     def arrays(self) -> dict[str, list[str]]:
         """The columns of each array: names that are alike up to their last dot."""
         arrays: dict[str, list[str]] = defaultdict(list)
