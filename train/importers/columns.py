@@ -66,6 +66,11 @@ class Meaning:
     unit_from: str
     are_all: bool = False
 
+    @property
+    def kind(self) -> str:
+        """What all trials of a set have alike."""
+        return f"time in {self.unit} and {len(self.taxels)} taxels {self.taxels}"
+
     def text(self, label: str, shape: Sequence[int]) -> str:
         """A line that says what was taken."""
         size = " x ".join(map(str, shape))

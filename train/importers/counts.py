@@ -131,6 +131,11 @@ class Rest:
     scale: float = 1.0
     lacking: str = ""
 
+    @property
+    def base(self) -> NDArray[np.float64] | float:
+        """What is subtracted from values."""
+        return 0.0 if self.values is None else self.values
+
     def recording(
         self,
         trial: Samples,
@@ -149,47 +154,39 @@ class Rest:
         """
         if not self.suits(trial):
             raise self.refusal(trial)
-        valid = self._valid(trial)
-        values = {}
+        skin = {**meta.get("skin", {}), "rows": shape[0], "cols": shape[1]}
+        meta = {**meta, "skin": skin}
         if self.values is not None:
             normal = self.values[:, 0].tolist()
             at_rest = [None if math.isnan(value) else value for value in normal]
-            values = {"values": {"counts_per_unit": self.scale, "rest": at_rest}}
-        skin = {**meta.get("skin", {}), "rows": shape[0], "cols": shape[1]}
-        axes = trial.values.shape[2]
-        if axes == 3:
-            skin["axes"] = axes
+            meta["values"] = {"counts_per_unit": self.scale, "rest": at_rest}
+        valid = self._valid(trial).reshape(-1, *shape)
         # A part at a time, as a long recording would else fill the memory several
         # times.
-        frames = np.empty((len(valid), *shape), np.uint16)
-        shear = np.empty((*frames.shape, 2), np.int16) if axes == 3 else None
-        for part, values_of_part in self._counts(trial):
-            counts = np.rint(values_of_part).reshape(-1, *shape, axes)
-            frames[part] = counts[..., 0]
-            if shear is not None:
-                shear[part] = counts[..., 1:]
+        parts = [np.rint(part).astype(np.int32) for part in self._counts(trial)]
+        counts = np.concatenate(parts).reshape(*valid.shape, -1)
+        axes = counts.shape[3]
+        if axes == 3:
+            skin["axes"] = axes
         return Recording(
             t=trial.t - trial.t[0],
-            frames=frames,
+            frames=counts[..., 0].astype(np.uint16),
             joints=trial.joints,
-            valid=None if valid.all() else valid.reshape(-1, *shape),
-            meta={**meta, "skin": skin, **values},
-            shear=shear,
+            valid=None if valid.all() else valid,
+            meta=meta,
+            shear=counts[..., 1:].astype(np.int16) if axes == 3 else None,
         )
 
     def suits(self, trial: Samples) -> bool:
         """Whether a trial's values become counts within their range, which are whole
         where no scale makes them so."""
         is_exact = self.scale == 1.0 and self.values is None
-        for _, counts in self._counts(trial):
-            normal = counts[..., 0]
+        for counts in self._counts(trial):
             whole = np.rint(counts)
-            if (
-                normal.min() < 0.0
-                or normal.max() > MOST_COUNTS + 0.5
-                or _largest(whole[..., 1:]) > MOST_SHEAR
-                or (is_exact and not np.array_equal(counts, whole))
-            ):
+            is_within = 0.0 <= whole[..., 0].min() <= whole[..., 0].max() <= MOST_COUNTS
+            if not is_within or _largest(whole[..., 1:]) > MOST_SHEAR:
+                return False
+            if is_exact and not np.array_equal(counts, whole):
                 return False
         return True
 
@@ -204,23 +201,19 @@ class Rest:
 
     def _valid(self, trial: Samples) -> NDArray[np.bool_]:
         """(n, taxels) which taxels have a value, and one at rest."""
-        valid = ~trial.missing
-        if self.values is not None:
-            valid &= np.isfinite(self.values).all(axis=1)
-        return valid
+        return np.asarray(np.isfinite(trial.values - self.base).all(axis=2))
 
-    def _counts(self, trial: Samples) -> Iterator[tuple[slice, NDArray[np.float64]]]:
+    def _counts(self, trial: Samples) -> Iterator[NDArray[np.float64]]:
         """Counts (rows, taxels, axes) of some frames after another, 0 where not valid."""
-        at_rest = 0.0 if self.values is None else self.values
-        valid = self._valid(trial)
+        valid = self._valid(trial)[..., None]
         for at in range(0, len(valid), PART):
             part = slice(at, at + PART)
-            moved = trial.values[part] - at_rest
-            counts = np.where(valid[part, :, None], moved, 0.0) * self.scale
+            moved = trial.values[part] - self.base
+            counts = np.where(valid[part], moved, 0.0) * self.scale
             if self.values is not None:
                 normal = counts[..., 0]
                 counts[..., 0] = np.maximum(-normal, 0.0) if self.falls else abs(normal)
-            yield part, counts
+            yield counts
 
 
 def rest_of(trials: Sequence[Samples], options: ValueOptions) -> Rest:
@@ -237,7 +230,7 @@ def rest_of(trials: Sequence[Samples], options: ValueOptions) -> Rest:
     rest = Rest(scale=options.scale)
     if options.falls or options.signed:
         rest = Rest(_quietest(trials, options), options.falls, options.scale)
-        deviations = [trial.values - rest.values for trial in trials]
+        deviations = [trial.values - rest.base for trial in trials]
         if options.falls:
             _say_lost(deviations)
         if rest.scale == 1.0:
@@ -253,9 +246,8 @@ def rest_of(trials: Sequence[Samples], options: ValueOptions) -> Rest:
 def _lacking(trials: Sequence[Samples], rest: Rest, codes: Sequence[float]) -> str:
     """The options by which the values of some trials would be counts."""
     words = [f"--missing {code:g}" for code in codes]
-    at_rest = 0.0 if rest.values is None else rest.values
     values = [
-        np.where(np.isin(trial.values, codes), math.nan, trial.values - at_rest)
+        np.where(np.isin(trial.values, codes), math.nan, trial.values - rest.base)
         for trial in trials
     ]
     finest = _finest(values)

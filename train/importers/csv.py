@@ -27,7 +27,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from edge.config import ConfigTable, short_text
+from edge.config import ConfigTable
 from edge.errors import InputError
 from edge.touch.arm import Chain
 from edge.touch.layout import RELEASE_S
@@ -96,28 +96,38 @@ def trials(
     if not measured:
         kind = "folder of frames" if options.frames else f"file {', '.join(SUFFIXES)}"
         raise InputError(f"{path}: holds no {kind}; give a folder of trials")
-    return _recorded(path, arm, _alike(measured, options.strict), options)
+    return _recorded(path, arm, measured, options)
 
 
 def _recorded(
     path: Path,
     arm: Chain | None,
-    alike: Sequence[Measured | Refused],
+    results: Sequence[Measured | Refused],
     options: TableOptions,
 ) -> Iterator[Trial | Refused]:
-    """The recordings of trials; prints what was taken."""
-    usable = [trial for trial in alike if isinstance(trial, Measured)]
-    if not usable:
+    """The recordings of trials, without those whose columns are not those of most of
+    them; prints what was taken."""
+    yield from (result for result in results if isinstance(result, Refused))
+    measured = [result for result in results if isinstance(result, Measured)]
+    if not measured:
         for line in PANDAS.splitlines():
             say(line)
-        yield from (result for result in alike if isinstance(result, Refused))
         return
+    kind = mode(trial.meaning.kind for trial in measured)
+    usable = [trial for trial in measured if trial.meaning.kind == kind]
     folder = path if path.is_dir() else path.parent
     skin = json_table(folder / SKIN)
+    if usable[0].meaning.are_all:
+        _require_taxels(usable)
     shape = _announced(usable, skin, options)
     rest = rest_of([trial.samples for trial in usable], options)
 
     def recorded(trial: Measured) -> Trial:
+        if trial.meaning.kind != kind:
+            raise InputError(
+                f"{trial.samples.where}: has {trial.meaning.kind:.80}, and most have "
+                f"{kind:.80}; see --taxels and --time-unit"
+            )
         meta: dict[str, Any] = {
             "skin": skin.raw,
             "labels": trial.labels,
@@ -128,7 +138,7 @@ def _recorded(
             meta["arm"] = arm and arm.to_dict()
         return Trial(trial.name, rest.recording(trial.samples, shape, meta))
 
-    yield from tried(alike, recorded, options.strict)
+    yield from tried(measured, recorded, options.strict)
 
 
 def _announced(
@@ -149,49 +159,6 @@ def _announced(
     if len({str(trial.labels) for trial in usable}) == len(usable) > FEWEST_ALONE:
         say(f"each trial has a label of its own; {FIRST_WORDS % options.task}")
     return shape
-
-
-def _alike(
-    measured: Sequence[Measured | Refused],
-    strict: bool,
-) -> list[Measured | Refused]:
-    """The trials, without those whose columns are not those of most of them.
-
-    Raises:
-        InputError: columns without a name may be no taxels.
-    """
-    usable = [trial for trial in measured if isinstance(trial, Measured)]
-    if not usable:
-        return list(measured)
-    kinds = [str((trial.meaning.taxels, trial.meaning.unit)) for trial in usable]
-    first = usable[kinds.index(mode(kinds))]
-
-    def compared(trial: Measured) -> Measured:
-        _compare(trial, first)
-        return trial
-
-    fitting = list(tried(measured, compared, strict))
-    if first.meaning.are_all:
-        _require_taxels([trial for trial in fitting if isinstance(trial, Measured)])
-    return fitting
-
-
-def _compare(trial: Measured, first: Measured) -> None:
-    """Refuse a trial with other columns than the first."""
-    path = trial.samples.where
-    first_path = first.samples.where
-    sense = trial.meaning
-    first_sense = first.meaning
-    if sense.taxels != first_sense.taxels:
-        raise InputError(
-            f"{path}: its taxels are {short_text(sense.taxels)}, and those of "
-            f"{first_path} {short_text(first_sense.taxels)}; name them by --taxels"
-        )
-    if sense.unit != first_sense.unit:
-        raise InputError(
-            f"{path}: its time seems to be in {sense.unit}, and that of {first_path} in "
-            f"{first_sense.unit}; give --time-unit"
-        )
 
 
 def _require_taxels(measured: Sequence[Measured]) -> None:

@@ -3,6 +3,7 @@
 import argparse
 import re
 from dataclasses import dataclass, fields
+from itertools import permutations
 from typing import Self
 
 from edge.commands.options import within
@@ -25,32 +26,6 @@ def shape_of_skin(text: str) -> tuple[int, int]:
             f"must be ROWSxCOLS, such as 16x24, not {text[:40]!r}"
         )
     return int(shape[1]), int(shape[2])
-
-
-def axis_letters(text: str) -> str:
-    """The letters of the axes along the rows, around the columns, and of the normal.
-
-    Raises:
-        ArgumentTypeError: they are not x, y and z in some order.
-    """
-    if sorted(text.lower()) != LETTERS:
-        raise argparse.ArgumentTypeError(
-            f"must be x, y and z in some order, such as xyz, not {text[:20]!r}"
-        )
-    return text.lower()
-
-
-def flipped_letters(text: str) -> str:
-    """The letters of the axes whose sign is turned round.
-
-    Raises:
-        ArgumentTypeError: one of them is not x, y or z.
-    """
-    if not text or not set(text.lower()) <= set(LETTERS):
-        raise argparse.ArgumentTypeError(
-            f"must be some of x, y and z, such as x or xz, not {text[:20]!r}"
-        )
-    return text.lower()
 
 
 def add_value_options(parser: argparse.ArgumentParser) -> None:
@@ -82,14 +57,16 @@ def add_value_options(parser: argparse.ArgumentParser) -> None:
     add("--missing", type=float, metavar="VALUE", help="stands for a missing value")
     add(
         "--axes",
-        type=axis_letters,
+        type=str.lower,
+        choices=[*map("".join, permutations(LETTERS))],
         metavar="XYZ",
         help="taxels of three axes, such as s1_x, s1_y, s1_z: the letters of the axes "
         "along the rows, around the columns, and of the normal force",
     )
     add(
         "--flip",
-        type=flipped_letters,
+        type=str.lower,
+        choices=["x", "y", "z", "xy", "xz", "yz", "xyz"],
         metavar="XYZ",
         help="letters of the axes whose sign is turned round",
     )

@@ -7,7 +7,6 @@ import gzip
 import io
 import lzma
 import re
-import warnings
 import zipfile
 from array import array
 from collections.abc import Callable, Iterator, Sequence, Set
@@ -157,7 +156,7 @@ def read_labels(path: Path) -> pd.DataFrame:
     """The columns of a text file with a header; each cell is text as it stands."""
     with _opened(path) as text:
         header = _header(text)
-        return _named(_texts(text, header, header.filled(text)), header)
+        return _texts(text, header, header.filled(text))
 
 
 def read_frame(path: Path) -> NDArray[np.float64]:
@@ -324,51 +323,46 @@ def _parsed(text: _Text, header: _Header) -> pd.DataFrame:
     Texts and the names of trials stand as they are: a label may be `None` or `NA`, and
     trial 007 is not trial 7. In a column of numbers such words are empty cells.
     """
-    with warnings.catch_warnings():
-        # Columns that hold texts in a part of a long table are read anew below.
-        warnings.simplefilter("ignore", pd.errors.DtypeWarning)
-        filled = header.filled(text)
-        table = _cells(text, header, usecols=filled, decimal=text.decimal)
-    altered = []
-    for i, dtype in table.dtypes.items():
-        if header.names[i] != "trial" and pd.api.types.is_numeric_dtype(dtype):
-            continue
-        # A word such as `NA` is no string any more, nor is a number beyond measure.
-        is_text = pd.api.types.infer_dtype(table[i]) == "string"
-        if not is_text or table[i].hasnans:
-            altered.append(i)
-    if altered:
-        table[altered] = _texts(text, header, altered)
-    return _named(table, header)
+    filled = header.filled(text)
+    table = _cells(text, header, filled, decimal=text.decimal, low_memory=False)
+    texts = [
+        i
+        for i, (name, dtype) in zip(filled, table.dtypes.items(), strict=True)
+        if name == "trial" or not pd.api.types.is_numeric_dtype(dtype)
+    ]
+    if texts:
+        as_they_stand = _texts(text, header, texts)
+        table[as_they_stand.columns] = as_they_stand
+    return table
 
 
-def _texts(text: _Text, header: _Header, columns: Sequence[int]) -> pd.DataFrame:
+def _texts(text: _Text, header: _Header, columns: list[int]) -> pd.DataFrame:
     """Columns of a text whose cells are texts, and NaN where they are empty."""
     empty = {"keep_default_na": False, "na_values": [""]}
-    return _cells(text, header, usecols=columns, dtype=str, **empty)
+    return _cells(text, header, columns, dtype=str, **empty)
 
 
-def _cells(text: _Text, header: _Header, **options: Any) -> pd.DataFrame:
-    """The columns of a text, which are named by their places; the index is the line of
-    each row."""
+def _cells(
+    text: _Text,
+    header: _Header,
+    columns: list[int],
+    **options: Any,
+) -> pd.DataFrame:
+    """Columns of a text by their names; the index is the line of each row."""
     lines = pd.Index(text.numbers[header.rows :], name="line")
-    return pd.read_csv(
+    table = pd.read_csv(
         # As bytes, for a `StringIO` takes four for each character.
         io.BytesIO(text.body.encode()),
         sep=text.mark or r"\s+",
         header=None,
         skiprows=header.rows,
-        names=range(len(header.names)),
+        names=header.unique,
+        usecols=columns,
         index_col=False,
         skipinitialspace=True,
         **options,
-    ).set_axis(lines)
-
-
-def _named(table: pd.DataFrame, header: _Header) -> pd.DataFrame:
-    """The columns by their names instead of their places."""
-    unique = header.unique
-    return table.set_axis([unique[i] for i in table], axis=1)
+    )
+    return table.set_axis(lines)
 
 
 def _unpacked(suffix: str, data: bytes) -> bytes:

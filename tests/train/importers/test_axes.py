@@ -125,7 +125,7 @@ def test_what_is_not_three_axes_is_one_sentence(
 def test_letters_that_are_no_axes_are_refused(text, tmp_path, capsys):
     with pytest.raises(SystemExit):
         main(["import", "csv", "x", "--out", str(tmp_path / "o"), "--axes", text])
-    assert "must be x, y and z in some order" in capsys.readouterr().err
+    assert "choose from 'xyz', 'xzy'" in capsys.readouterr().err
 
 
 def test_shear_beyond_its_range_is_refused(folder, refusal):
@@ -133,4 +133,20 @@ def test_shear_beyond_its_range_is_refused(folder, refusal):
     large[30, 0, 0] = 40000
     write_table(folder, named(), large)
     message = refusal("import", "csv", folder, "--out", folder / "out", "--axes", "xyz")
-    assert "shear reaches 40000 counts, and at most 32767" in message
+    assert "-898 to 40000 are no counts" in message
+    assert "of shear to 32767); add --scale 0.819175" in message
+
+
+def test_shear_with_fractions_is_refused(folder, refusal):
+    write_table(folder, named(), THREE / (1, 1, 10) / 10)
+    message = refusal("import", "csv", folder, "--out", folder / "out", "--axes", "xyz")
+    assert "add --scale 100" in message
+
+
+def test_taxels_of_three_axes_are_taken_beside_their_magnitudes(folder, imported):
+    magnitudes = np.abs(THREE).sum(axis=2, keepdims=True)
+    forms = "opto{}_x opto{}_y opto{}_z force{}".split()
+    names = [form.format(i + 1) for i in range(TAXELS) for form in forms]
+    write_table(folder, names, np.concatenate([THREE, magnitudes], axis=2))
+    recording = imported("--axes", "xyz")
+    assert recording.frames[:, 0].tolist() == THREE[..., 2].tolist()

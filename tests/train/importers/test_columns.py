@@ -49,6 +49,7 @@ def test_any_further_column_is_left_out_and_named(name):
     ("names", "sentence"),
     [
         (("thumb", "index"), "no columns are named as taxels"),
+        (("p1", "p2", "p4", "f"), "s1 to s16 without a gap; give --taxels p1,p2,p4, "),
         (("p1", "p2", "f1", "f2"), 'are the taxels "p1" to "p2" or "f1" to "f2"'),
         (("taxel_1", "taxel_2", "tactile1", "tactile2"), 'are the taxels "taxel_1"'),
     ],
@@ -126,8 +127,9 @@ def test_times_since_1970_tell_their_unit(start, unit):
     assert sense_of(table("s1", t=start + COUNTS * 1e6)).unit == unit
 
 
-def test_iso_dates_are_times_whatever_their_column_is_called():
-    dates = [f"2024-03-01T10:00:00.{i}00" for i in range(5)]
+@pytest.mark.parametrize("start", ["2024-03-01T10:", "01.03.2024 9:", "12:"])
+def test_times_of_the_day_are_times_whatever_their_column_is_called(start):
+    dates = [f"{start}00:00.{i}00" for i in range(5)]
     source = table("s1", zeit=dates)
     sense = sense_of(source)
     assert sense.unit == "iso"
@@ -145,7 +147,9 @@ def test_steps_that_may_be_in_either_of_two_units_are_asked_for(step, units):
 
 def test_what_is_no_date_is_named():
     source = table("s1", t=["2024-03-01T10:00", "noon", None, None, None])
-    with pytest.raises(InputError, match=r"'noon' in column t is no ISO date \(row 2"):
+    with pytest.raises(
+        InputError, match=r"'noon' in column t is no time of the day \(row 2"
+    ):
         times_of(source, sense_of(source, time_unit="iso"), TableOptions())
 
 
