@@ -89,14 +89,7 @@ def order(
             f"{where}: its time stands still at {frame} {numbers[still]}; name another "
             "time, or fix the times"
         )
-    changes = []
-    shortest_s = float(np.quantile(forward, 0.1)) if len(forward) else 0.0
-    longest_s = float(steps.max(initial=0.0))
-    if longest_s > max(RELEASE_S, GAP_STEPS * shortest_s):
-        changes.append(
-            f"its steps are {shortest_s:.3g} to {longest_s:.3g} s, as of a log that pauses "
-            "or writes on change alone"
-        )
+    changes = _sparse(forward)
     swapped = int((steps < 0.0).sum())
     if swapped:
         changes.append(f"{counted(swapped, 'time')} went back within the jitter")
@@ -105,6 +98,18 @@ def order(
             f"{counted(len(repeated), 'frame')} skipped, as later ones have their times"
         )
     return Order(frames[last], "; ".join(changes))
+
+
+def _sparse(steps: NDArray[np.float64]) -> list[str]:
+    """A sentence for steps (n,) as of a log that is not written at all times."""
+    shortest_s = float(np.quantile(steps, 0.1)) if len(steps) else 0.0
+    longest_s = float(steps.max(initial=0.0))
+    if longest_s <= max(RELEASE_S, GAP_STEPS * shortest_s):
+        return []
+    return [
+        f"its steps are {shortest_s:.3g} to {longest_s:.3g} s, as of a log that pauses or "
+        "writes on change alone"
+    ]
 
 
 def angles_at(

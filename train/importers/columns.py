@@ -235,20 +235,20 @@ def _running(table: Table, rest: Sequence[str]) -> tuple[list[str], tuple[int, .
     grids = _grids(*rest)
     grids = [grid for grid in grids if TAXELS.match(grid[0][0])] or grids
     grids = [grid for grid in grids if len(grid[0]) > 1] or grids
-    if len(grids) > 1:
+    if len(grids) == 1:
+        return grids[0]
+    if grids:
         spans = " or ".join(spanned(names) for names, _ in grids)
         raise InputError(
             f"{table.where}: are the taxels {spans}? Name them by --taxels, and joint "
             "angles by --joints"
         )
-    if not grids:
-        three = ", or --axes xyz for taxels of three axes" * any(map(lettered, rest))
-        numbered = ",".join(name for name in rest if re.match(RUNNING, name))
-        raise InputError(
-            f"{table.where}: no columns are named as taxels, such as s1 to s16 without a "
-            f"gap; give --taxels {numbered or 'COLS'}{three}, among {short_text(list(rest))}"
-        )
-    return grids[0]
+    three = ", or --axes xyz for taxels of three axes" * any(map(lettered, rest))
+    running = ",".join(filter(re.compile(RUNNING).match, rest))
+    raise InputError(
+        f"{table.where}: no columns are named as taxels, such as s1 to s16 without a gap; "
+        f"give --taxels {running or 'COLS'}{three}, among {short_text(list(rest))}"
+    )
 
 
 @cache

@@ -229,18 +229,23 @@ def rest_of(trials: Sequence[Samples], options: ValueOptions) -> Rest:
     codes = _say_missing(trials, options.missing)
     rest = Rest(scale=options.scale)
     if options.falls or options.signed:
-        rest = Rest(_quietest(trials, options), options.falls, options.scale)
-        deviations = [trial.values - rest.base for trial in trials]
-        if options.falls:
-            _say_lost(deviations)
-        if rest.scale == 1.0:
-            rest = replace(rest, scale=_finest(deviations))
+        rest = _moved(trials, options)
     refused = [trial for trial in trials if not rest.suits(trial)]
     if refused:
         rest = replace(rest, lacking=_lacking(refused, rest, codes))
     if 2 * len(refused) > len(trials):
         raise rest.refusal(refused[0])
     return rest
+
+
+def _moved(trials: Sequence[Samples], options: ValueOptions) -> Rest:
+    """How values become counts that are told from those at rest; says which are lost."""
+    rest = Rest(_quietest(trials, options), options.falls, options.scale)
+    deviations = [trial.values - rest.base for trial in trials]
+    rise = max(np.fmax.reduce(d, axis=None, initial=0.0) for d in deviations)
+    if options.falls and rise > 0.0:
+        say(f"values above those at rest, by up to {rise:g}, count as 0; see --signed")
+    return replace(rest, scale=_finest(deviations)) if rest.scale == 1.0 else rest
 
 
 def _lacking(trials: Sequence[Samples], rest: Rest, codes: Sequence[float]) -> str:
@@ -287,13 +292,6 @@ def _say_missing(trials: Sequence[Samples], stand_in: float | None) -> list[floa
             codes.append(code)
             values = others
     return codes
-
-
-def _say_lost(deviations: Sequence[NDArray[np.float64]]) -> None:
-    """Say how far values rise that only count as they fall."""
-    rise = max(np.fmax.reduce(d, axis=None, initial=0.0) for d in deviations)
-    if rise > 0.0:
-        say(f"values above those at rest, by up to {rise:g}, count as 0; see --signed")
 
 
 def _quietest(trials: Sequence[Samples], options: ValueOptions) -> NDArray[np.float64]:

@@ -92,27 +92,31 @@ def trials(
     """
     options = TableOptions.of(arguments)
     understood = partial(_understood, options=options)
-    measured = list(tried(sources_in(path, options), understood, options.strict))
-    if not measured:
+    measured = []
+    results = list(tried(sources_in(path, options), understood, options.strict))
+    for result in results:
+        if isinstance(result, Refused):
+            yield result
+        else:
+            measured.append(result)
+    if measured:
+        yield from _recorded(path, arm, measured, options)
+    elif results:
+        for line in PANDAS.splitlines():
+            say(line)
+    else:
         kind = "folder of frames" if options.frames else f"file {', '.join(SUFFIXES)}"
         raise InputError(f"{path}: holds no {kind}; give a folder of trials")
-    return _recorded(path, arm, measured, options)
 
 
 def _recorded(
     path: Path,
     arm: Chain | None,
-    results: Sequence[Measured | Refused],
+    measured: Sequence[Measured],
     options: TableOptions,
 ) -> Iterator[Trial | Refused]:
     """The recordings of trials, without those whose columns are not those of most of
     them; prints what was taken."""
-    yield from (result for result in results if isinstance(result, Refused))
-    measured = [result for result in results if isinstance(result, Measured)]
-    if not measured:
-        for line in PANDAS.splitlines():
-            say(line)
-        return
     kind = mode(trial.meaning.kind for trial in measured)
     usable = [trial for trial in measured if trial.meaning.kind == kind]
     folder = path if path.is_dir() else path.parent

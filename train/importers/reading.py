@@ -110,13 +110,11 @@ class _Header:
         names: numbers from 1 where there are none.
         named: whether the text has them.
         rows: of the body that they take.
-        form: what a user should know of them.
     """
 
     names: list[str]
     named: bool
     rows: int
-    form: tuple[str, ...] = ()
 
     @property
     def unique(self) -> list[str]:
@@ -143,13 +141,10 @@ def read_text(path: Path) -> Table:
             form.append(f"separated by {MARKS[text.mark]}")
         header = _header(text)
         _refuse_thousands(text)
-        return Table(
-            str(path),
-            _parsed(text, header),
-            header.named,
-            decimal=text.decimal,
-            form=(*form, *header.form),
-        )
+        if not header.named:
+            form.append("no header")
+        table = _parsed(text, header)
+        return Table(str(path), table, header.named, text.decimal, form=tuple(form))
 
 
 def read_labels(path: Path) -> pd.DataFrame:
@@ -262,7 +257,7 @@ def _names(cells: list[str]) -> list[str]:
 
 def _without_names(text: _Text) -> _Header:
     """The numbers that name the columns of a text without a header."""
-    return _Header(numbered("", len(text.rows[0])), False, 0, ("no header",))
+    return _Header(numbered("", len(text.rows[0])), False, 0)
 
 
 def _header(text: _Text) -> _Header:

@@ -16,7 +16,7 @@ from edge.config import short_text
 from edge.errors import InputError, about
 from edge.files import parsing
 from train.importers import Refused, arrays
-from train.importers.columns import columns, is_date, named_times
+from train.importers.columns import columns, named_times
 from train.importers.options import TableOptions
 from train.importers.reading import (
     TEXTS,
@@ -289,8 +289,7 @@ def _of_frames(
     shape = frames[0].shape
     for file, frame in zip(files, frames, strict=True):
         if frame.shape != shape:
-            sizes = [" x ".join(map(str, size)) for size in (frame.shape, shape)]
-            raise InputError(f"{file}: is {sizes[0]} taxels, and {files[0]} {sizes[1]}")
+            raise InputError(f"{file}: is {frame.shape} taxels, and {files[0]} {shape}")
     values = np.reshape(frames, (len(files), -1))
     data = pd.DataFrame(values, columns=numbered("", values.shape[1]))
     if options.rate is None:
@@ -339,22 +338,12 @@ def _trials_in(table: Table, options: TableOptions) -> Iterator[Source | Refused
 
 
 def _tasks_in(table: Table, task: str) -> list[str]:
-    """The columns of labels of a long table: that of the task, and those of texts, apart
-    from times that run within a trial. A number among texts is a label if it stays the
-    same within its trial."""
-    tasks = []
-    for name in table.names:
-        column = table.data[name]
-        if name in ("trial", "taxel") or pd.api.types.is_numeric_dtype(column):
-            is_task = name == task
-        else:
-            texts = column.astype(str).groupby(table.data["trial"])
-            words = pd.to_numeric(column, errors="coerce").isna().all()
-            runs = texts.nunique().max() > 1
-            is_task = not runs or (words and not is_date(table, name))
-        if is_task:
-            tasks.append(name)
-    return tasks
+    """The columns of labels of a long table: that of the task, and those of texts that
+    stay the same within a trial."""
+    texts = table.data.select_dtypes(exclude=["number", "bool"]).astype(str)
+    texts = texts.drop(columns=["trial", "taxel"], errors="ignore")
+    values = texts.groupby(table.data["trial"]).nunique().max()
+    return [name for name in table.names if name == task or values.get(name) == 1]
 
 
 def _labels_in(where: str, rows: pd.DataFrame) -> dict[str, str]:

@@ -258,7 +258,7 @@ RATE = ("--rate", "1")
         (
             {"a/0.csv": "1 2\n", "a/1.csv": "1\n2\n"},
             ("--frames",),
-            "1.csv: is 2 x 1 taxels, and ",
+            "1.csv: is (2, 1) taxels, and ",
         ),
         ({"a/0.csv": "1 0.5\n"}, ("--frames",), "a: 0.5 to 1 are no counts"),
         (
