@@ -117,6 +117,9 @@ def angles_at(
     joints_t: NDArray[np.float64],
     angles: NDArray[np.float64],
     release_s: float,
+    where: object = "",
+    frame: str = "message",
+    numbers: Sequence[int] | None = None,
 ) -> NDArray[np.float64]:
     """Joint angles (n, dof) at the frames' times.
 
@@ -126,12 +129,18 @@ def angles_at(
 
     Args:
         t: (n,) seconds.
-        joints_t: (m,) seconds of the messages, increasing.
+        joints_t: (m,) seconds of the messages.
         angles: (m, dof) radians.
         release_s: of the skin; a longer step is a gap, unless it is less than five
             usual steps.
+        where, frame, numbers: of the messages, as for `order`.
+
+    Raises:
+        InputError: as `order`.
     """
-    unwrapped = np.unwrap(angles, axis=0)
+    kept = order(joints_t, where, frame, numbers).kept
+    joints_t = joints_t[kept]
+    unwrapped = np.unwrap(angles[kept], axis=0)
     columns = [np.interp(t, joints_t, column) for column in unwrapped.T]
     at_frames = np.stack(columns, axis=1)
     gap_s = release_s

@@ -223,10 +223,15 @@ def _with_joints(
     if known.all() or not known.any():
         return replace(samples, joints=clock.complete(angles, where)), rows
     felt = np.isfinite(samples.values).any(axis=(1, 2))
-    order = clock.order(samples.t[known], where, str(rows.name), rows[known]).kept
-    joints_t = samples.t[known][order]
+    t = samples.t[felt]
     at_frames = clock.angles_at(
-        samples.t[felt], joints_t, angles[known][order], RELEASE_S
+        t,
+        samples.t[known],
+        angles[known],
+        RELEASE_S,
+        where,
+        str(rows.name),
+        rows[known],
     )
-    frames = Samples(where, samples.t[felt], samples.values[felt])
-    return replace(frames, joints=clock.complete(at_frames, where)), rows[felt]
+    joints = clock.complete(at_frames, where)
+    return Samples(where, t, samples.values[felt], joints), rows[felt]

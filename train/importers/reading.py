@@ -35,7 +35,7 @@ UNPACKERS: dict[str, Callable[..., Any]] = {
 }
 """Files that hold one packed text, by their suffix."""
 PACKED = (*UNPACKERS, ".zip")
-MARKS = {"\t": "tabs", ";": "semicolons", "|": "bars", ",": "commas"}
+MARKS = "\t;|,"
 """Separators; a text with none of them is separated by blanks."""
 ABOVE = re.compile(r"[#%]|sep=.\Z|\s*\Z", re.A)
 """How a comment, blank line or separator (of Excel) before the first row begins."""
@@ -137,8 +137,6 @@ def read_text(path: Path) -> Table:
         form = text.form
         if text.decimal == ",":
             form.append("decimal commas")
-        if text.mark not in ("", ","):
-            form.append(f"separated by {MARKS[text.mark]}")
         header = _header(text)
         _refuse_thousands(text)
         if not header.named:

@@ -214,9 +214,9 @@ def _joints(
     if not angles:
         return None
     joints_t = (np.array(stamps) - start_ms) / 1000.0
-    rows = clock.order(joints_t, f"{file}: its joint angles", "angle").kept
     radians = np.radians(np.array(angles))
-    return clock.angles_at(t, joints_t[rows], radians[rows], RELEASE_S)
+    where = f"{file}: its joint angles"
+    return clock.angles_at(t, joints_t, radians, RELEASE_S, where, "angle")
 
 
 def _number(

@@ -4,7 +4,6 @@ before their columns are understood."""
 import re
 from collections.abc import Callable, Iterable, Iterator, Sequence, Set
 from dataclasses import dataclass, field, replace
-from functools import partial
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -27,7 +26,7 @@ from train.importers.reading import (
     read_text,
     suffix_of,
 )
-from train.importers.tables import Table, numbered, require_filled
+from train.importers.tables import Table, numbered, require_filled, require_unique
 
 LABELS = "labels.csv"
 SKIN = "skin.json"
@@ -131,8 +130,8 @@ def _labelled(
             continue
         if source.name not in rows:
             yield Refused(f"{path}: has no row for {source.name}, which has no label")
-        others = {key: source.labels[key] for key in source.labels if key != task}
-        labels = others | rows.get(source.name, {})
+        labels = {**source.labels, task: "", **rows.get(source.name, {})}
+        labels = {key: label for key, label in labels.items() if label}
         yield replace(source, labels=labels, label=LABELS)
 
 
@@ -166,16 +165,11 @@ def _sources(
         places = _files(_visible(path))
     counting = _counting([place.relative_to(folder) for place in places])
     for place in places:
-        named = partial(
-            _named_by, *_label(place.relative_to(folder), counting, options.task)
-        )
-        sources = until_refused(read(place, folder, options), options.strict)
-        yield from tried(sources, named, options.strict)
-
-
-def _named_by(labels: dict[str, str], label: str, source: Source) -> Source:
-    """A trial with the labels of its names, where nothing else tells one."""
-    return source if source.label else replace(source, labels=labels, label=label)
+        labels, label = _label(place.relative_to(folder), counting, options.task)
+        for source in until_refused(read(place, folder, options), options.strict):
+            if isinstance(source, Source) and not source.label:
+                source = replace(source, labels=labels, label=label)
+            yield source
 
 
 def _visible(folder: Path) -> list[Path]:
@@ -373,10 +367,7 @@ def _wide(table: Table, options: TableOptions) -> Table:
     _check_long(table, time)
     wide = table.data.pivot(index=time, columns="taxel", values="value")
     wide = wide[sorted(wide.columns, key=_natural)].rename(columns=_plain)
-    if not wide.columns.is_unique or time in wide:
-        raise InputError(
-            f"{table.where} has two taxels of one name; rename one of them"
-        )
+    require_unique([time, *wide.columns])
     form = [f'ignored: "{name}"' for name in further if name != time]
     return replace(
         table,

@@ -252,9 +252,8 @@ class Log:
         for name in names:
             joint = angles[angles["joint"] == name]
             joint_t = joint.iloc[:, 0].to_numpy()
-            places = clock.order(joint_t, where, "message").kept
-            radians = joint[["angle"]].to_numpy()[places]
-            columns.append(clock.angles_at(t, joint_t[places], radians, release_s))
+            radians = joint[["angle"]].to_numpy()
+            columns.append(clock.angles_at(t, joint_t, radians, release_s, where))
         return clock.complete(np.hstack(columns), where)
 
     def _joint_names(self, where: str, logged: list[str | int]) -> list[str | int]:

@@ -82,7 +82,7 @@ def test_what_unpacks_to_too_much_is_refused(tmp_path, monkeypatch):
 
 def test_how_a_file_was_read_is_said(tmp_path):
     table = read(tmp_path, "zeit;p1\n0,0;1,5\n0,01;2,5\n".encode("utf-16"))
-    assert table.form == ("UTF-16", "decimal commas", "separated by semicolons")
+    assert table.form == ("UTF-16", "decimal commas")
     assert "Windows-1252" in read(tmp_path, "t,größe\n0,1\n".encode("cp1252")).form
 
 
