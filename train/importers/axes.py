@@ -139,14 +139,10 @@ def parted(table: Table, normal: str) -> Parted:
         )
     taxel_of = dict(zip(axes[normal], axes.index, strict=True))
     plain = table.data.drop(columns=axes.to_numpy().ravel())
+    # A magnitude may have the taxel's name.
+    plain = plain.rename(columns={name: f"{name} without axes" for name in axes.index})
     normals = table.data[[name for name in table.names if name in taxel_of]]
     data = pd.concat([plain, normals.rename(columns=taxel_of)], axis=1)
-    if not data.columns.is_unique:
-        twice = data.columns[data.columns.duplicated()][0]
-        raise InputError(
-            f"{table.where}: {twice} names a column and a taxel of three axes; rename one "
-            "of them"
-        )
     normal_table = replace(table, data=data, shape=shape, file_names=())
     return Parted(**vars(normal_table), whole=table, axes=axes)
 

@@ -108,9 +108,9 @@ def skin_shape(
     shape = options.shape or stated_shape
     taxels = trial.values.shape[1]
     if len(shape) != 2 or math.prod(shape) != taxels:
-        size = " x ".join(map(str, shape))
+        size = " x ".join(map(str, shape)) if len(shape) == 2 else "known rows of"
         raise InputError(
-            f"{trial.where}: {taxels} values a frame are not {size} taxels; give --shape"
+            f"{trial.where}: {taxels} values a frame are no {size} taxels; give --shape"
         )
     return shape[0], shape[1]
 

@@ -92,13 +92,9 @@ def trials(
     """
     options = TableOptions.of(arguments)
     understood = partial(_understood, options=options)
-    measured = []
     results = list(tried(sources_in(path, options), understood, options.strict))
-    for result in results:
-        if isinstance(result, Refused):
-            yield result
-        else:
-            measured.append(result)
+    yield from (result for result in results if isinstance(result, Refused))
+    measured = [result for result in results if isinstance(result, Measured)]
     if measured:
         yield from _recorded(path, arm, measured, options)
     elif results:

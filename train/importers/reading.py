@@ -13,7 +13,7 @@ from collections.abc import Callable, Iterator, Sequence, Set
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from functools import cached_property
-from itertools import islice, takewhile
+from itertools import takewhile
 from pathlib import Path
 from typing import Any
 
@@ -69,7 +69,7 @@ class _Text:
         body: from the first row on, without comments and blank lines.
         numbers: the line in the file of each row.
         mark: the separator; empty for blanks.
-        rows: the cells of the first row, and of the second if there is one.
+        first: the cells of the first row.
         empty: the places of the columns without a name or a value.
         comment: the last comment before the first row; empty without one.
         form: how it was encoded, if not as UTF-8.
@@ -78,7 +78,7 @@ class _Text:
     body: str
     numbers: Sequence[int]
     mark: str
-    rows: list[list[str]]
+    first: list[str]
     empty: Set[int]
     comment: str
     form: list[str]
@@ -195,9 +195,9 @@ def _text(data: bytes) -> _Text:
     comments = [line for line in above if line[:1] in set("#%")]
     body = "\n".join(chosen_lines)
     numbers = _lines_of_rows(chosen_lines, numbers, mark)
-    rows = [row for _, row in islice(_rows(chosen_lines, mark), 2)]
+    _, first = next(_rows(chosen_lines, mark))
     empty = _empty(chosen_lines, mark)
-    return _Text(body, numbers, mark, rows, empty, "".join(comments[-1:]), form)
+    return _Text(body, numbers, mark, first, empty, "".join(comments[-1:]), form)
 
 
 def _empty(lines: list[str], mark: str) -> Set[int]:
@@ -255,7 +255,7 @@ def _names(cells: list[str]) -> list[str]:
 
 def _without_names(text: _Text) -> _Header:
     """The numbers that name the columns of a text without a header."""
-    return _Header(numbered("", len(text.rows[0])), False, 0)
+    return _Header(numbered("", len(text.first)), False, 0)
 
 
 def _header(text: _Text) -> _Header:
@@ -266,14 +266,14 @@ def _header(text: _Text) -> _Header:
     """
     header = _stated(text)
     require_unique(header.unique)
-    if header.rows == len(text.rows):
+    if header.rows == len(text.numbers):
         raise InputError(EMPTY)
     return header
 
 
 def _stated(text: _Text) -> _Header:
     """The names as they stand; a row of numbers and empty cells has none."""
-    cells = _names(text.rows[0])
+    cells = _names(text.first)
     numbers = [_is_number(cell) for cell in cells if cell]
     above = [text.comment.lstrip("#% ")]
     _, heading = next(_rows(above, text.mark))
@@ -380,9 +380,8 @@ def _decoded(data: bytes) -> tuple[str, list[str]]:
     """A text, and how it was encoded if not in UTF-8."""
     if data.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
         return data.decode("utf-16"), ["UTF-16"]
-    data = data.removeprefix(codecs.BOM_UTF8)
     try:
-        return data.decode(), []
+        return data.decode("utf-8-sig"), []
     except UnicodeDecodeError:
         return data.decode("cp1252"), ["Windows-1252"]
 

@@ -101,18 +101,13 @@ def numbers_of(table: Table, name: str) -> pd.Series:
     """A column as numbers; empty cells are NaN.
 
     Raises:
-        InputError: a cell is no number.
+        InputError: a cell is no number, or one beyond measure.
     """
     column = table.data[name]
     if table.decimal == "," and not pd.api.types.is_numeric_dtype(column):
         column = column.str.replace(",", ".", n=1)
     numbers = pd.to_numeric(column, errors="coerce").astype("float64")
-    infinite = np.isinf(numbers)
-    if infinite.any():
-        raise InputError(
-            f"{table.where}: column {name} has a number beyond measure in "
-            f"{place_of(infinite)}; fix or delete it"
-        )
+    numbers = numbers.where(np.isfinite(numbers))
     require_converted(table, name, numbers, "no number")
     return numbers
 

@@ -204,23 +204,14 @@ class Log:
         )
 
     def _stated_shape(self, shape: tuple[int, ...]) -> tuple[int, ...]:
-        """The rows and columns that frames of a shape tell, or the file beside the log.
-
-        Raises:
-            InputError: neither does, nor --shape.
-        """
+        """The rows and columns that frames of a shape tell, or else the file beside the
+        log."""
         if self.options.axes is not None:
             shape = shape[:-1]
-        if len(shape) == 2 or self.options.shape is not None:
-            return shape
         skin = self.beside.table("skin", {})
-        if skin.has("rows") and skin.has("cols"):
-            return skin.whole("rows"), skin.whole("cols")
-        raise InputError(
-            f"{self.path}: its frames do not state their rows and columns; give --shape "
-            'ROWSxCOLS, or put them as {"skin": {"rows": ..., "cols": ...}} into '
-            f"{self.path.stem}.json beside it"
-        )
+        if len(shape) != 2 and skin.has("rows"):
+            shape = (skin.whole("rows"), skin.whole("cols"))
+        return shape
 
     def _clock(self, frames: pd.DataFrame, angles: pd.DataFrame) -> str:
         """The clock of the times: that of the stamps; but that of logging, which is

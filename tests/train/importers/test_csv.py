@@ -232,7 +232,7 @@ RATE = ("--rate", "1")
         (
             {"1.txt": "1 2\n"},
             (*RATE, "--shape", "2x2"),
-            "2 values a frame are not 2 x 2 taxels; give --shape",
+            "2 values a frame are no 2 x 2 taxels; give --shape",
         ),
         (
             {"1.txt": "1 2\n", "2.txt": "1 2 3\n"},
