@@ -88,8 +88,8 @@ class Meaning:
 
 
 def quoted(name: str) -> str:
-    """A column's name in quotation marks, or words for a column without one."""
-    return f'"{name}"' if name else "a column without a name"
+    """A column's name in quotation marks."""
+    return f'"{name}"'
 
 
 def spanned(names: Sequence[str]) -> str:
@@ -233,8 +233,8 @@ def _running(table: Table, rest: Sequence[str]) -> tuple[list[str], tuple[int, .
     """The taxels by a common stem with running numbers, in the order of the numbers;
     and their shape, where they have two."""
     grids = _grids(*rest)
-    grids = [grid for grid in grids if TAXELS.match(grid[0][0])] or grids
-    grids = [grid for grid in grids if len(grid[0]) > 1] or grids
+    for is_likely in (lambda names: TAXELS.match(names[0]), lambda names: names[1:]):
+        grids = [grid for grid in grids if is_likely(grid[0])] or grids
     if len(grids) == 1:
         return grids[0]
     if grids:

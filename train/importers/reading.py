@@ -118,11 +118,8 @@ class _Header:
 
     @property
     def unique(self) -> list[str]:
-        """The names; further columns without one are told apart by their places."""
-        names = [name or f"column {place}" for place, name in enumerate(self.names, 1)]
-        if "" in self.names:
-            names[self.names.index("")] = ""
-        return names
+        """The names; columns without one are told apart by their places."""
+        return [name or f"column {place}" for place, name in enumerate(self.names, 1)]
 
     def filled(self, text: _Text) -> list[int]:
         """The places of the columns that have a name or a value."""

@@ -38,7 +38,7 @@ def test_taxels_with_a_row_and_a_column_tell_the_shape(form):
     assert sense.taxels[:3] == [form.format(0, col) for col in range(3)]
 
 
-@pytest.mark.parametrize("name", ["label", "frame", ""])
+@pytest.mark.parametrize("name", ["label", "frame"])
 def test_any_further_column_is_left_out_and_named(name):
     sense = sense_of(table("p1", "p2", name), rate=10)
     assert sense.taxels == ["p1", "p2"]
@@ -154,9 +154,9 @@ def test_what_is_no_date_is_named():
 
 
 def test_a_line_says_what_was_taken():
-    source = table("t", *(f"p{i}" for i in range(1, 17)), "label", "")
+    source = table("t", *(f"p{i}" for i in range(1, 17)), "label", "column 3")
     sense = sense_of(source, time_unit="ms")
     assert sense.text("folder", (4, 4)) == (
         'time: "t" in ms (as said), taxels: "p1" to "p16" (16, as 4 x 4), label: folder; '
-        'ignored: "label", a column without a name'
+        'ignored: "label", "column 3"'
     )

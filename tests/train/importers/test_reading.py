@@ -153,7 +153,7 @@ def test_the_index_of_a_parquet_table_is_a_column(tmp_path):
 
 def test_columns_without_a_name_are_told_apart_by_their_places(tmp_path):
     table = read(tmp_path, ",t,,p1,\n0,0,7,1,\n1,1,8,2,\n")
-    assert table.names == ["", "t", "column 3", "p1"]
+    assert table.names == ["column 1", "t", "column 3", "p1"]
 
 
 def test_a_long_text_is_held_once():
