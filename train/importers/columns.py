@@ -294,10 +294,8 @@ def _unit(
 def _likely_unit(table: Table, time: str) -> tuple[str, str]:
     """The unit of times that only their numbers tell, and how they do."""
     values = numbers_of(table, time).dropna()
-    if values.empty:
-        raise InputError(f"{table.where}: column {time} holds no times")
     for unit, earliest in EPOCHS.items():
-        if abs(values.iloc[0]) >= earliest:
+        if values.max() >= earliest:
             return unit, "since 1970"
     steps = values.diff()
     step = median = steps[steps > 0.0].median()

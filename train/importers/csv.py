@@ -149,8 +149,8 @@ def _announced(
     """The rows and columns of the skin; prints what was taken, once for all files."""
     first = usable[0]
     taxels = len(first.meaning.taxels)
-    shape_in_file = first.meaning.shape
-    shape_in_file = shape_in_file or (skin.whole("rows", 1), skin.whole("cols", taxels))
+    in_skin = skin.whole("rows", 1), skin.whole("cols", taxels)
+    shape_in_file = first.meaning.shape or in_skin
     shape = skin_shape(first.samples, shape_in_file, options)
     text = first.meaning.text(first.label, shape)
     say("; ".join([text, *first.form]))

@@ -31,6 +31,7 @@ TEXTS = (".csv", ".tsv", ".txt", ".dat")
 UNPACKERS: dict[str, Callable[..., Any]] = {
     ".gz": gzip.open,
     ".bz2": bz2.open,
+    ".dsa": bz2.open,
     ".xz": lzma.open,
 }
 """Files that hold one packed text, by their suffix."""
@@ -163,11 +164,12 @@ def _opened(path: Path) -> Iterator[_Text]:
     Raises:
         InputError: it cannot be read, or the block failed; the sentence names the file.
     """
-    data = read_bytes(path, LARGEST_BYTES)
-    with parsing(str(path), "a table", "; save it as text"), about(str(path)):
-        text = _text(_unpacked(path.suffix.lower(), data))
-        del data  # the text alone is needed, and may be long
-        yield text
+    with parsing(str(path), "a table", "; save it as text"):
+        data = read_unpacked(path)
+        with about(str(path)):
+            text = _text(data)
+            del data  # the text alone is needed, and may be long
+            yield text
 
 
 def _text(data: bytes) -> _Text:
@@ -355,21 +357,30 @@ def _cells(
     return table.set_axis(lines)
 
 
-def _unpacked(suffix: str, data: bytes) -> bytes:
-    """The bytes of a file, unpacked where its suffix says that it is packed."""
+def read_unpacked(path: Path) -> bytes:
+    """The bytes of a file, unpacked where its suffix says that it is packed.
+
+    Raises:
+        InputError: it cannot be read, or is too large.
+    """
+    data = read_bytes(path, LARGEST_BYTES)
     file: Any = io.BytesIO(data)
+    suffix = path.suffix.lower()
     if suffix == ".zip":
         archive = zipfile.ZipFile(file)
         names = archive.namelist()
         if len(names) != 1:
-            raise InputError(f"holds {len(names)} files; unpack it into a folder")
+            raise InputError(
+                f"{path}: holds {len(names)} files; unpack it into a folder"
+            )
         file = archive.open(names[0])
     elif suffix in UNPACKERS:
         file = UNPACKERS[suffix](file)
     with file:
         data = file.read(LARGEST_BYTES + 1)
     if len(data) > LARGEST_BYTES:
-        raise InputError(f"holds more than {LARGEST_BYTES >> 20} MB; save it in parts")
+        megabytes = LARGEST_BYTES >> 20
+        raise InputError(f"{path}: holds more than {megabytes} MB; save it in parts")
     return data
 
 
