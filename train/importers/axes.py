@@ -102,7 +102,7 @@ class Parted(Table):
             if name not in self.axes.index:
                 raise InputError(f"{self.where}: taxel {name} has one axis alone")
         columns = self.axes.loc[list(names)].to_numpy()
-        return self.whole.numbers(columns.flat).reshape(-1, *columns.shape)
+        return self.whole.numbers(columns.ravel()).reshape(-1, *columns.shape)
 
 
 def lettered(name: str) -> tuple[str, str] | None:

@@ -68,11 +68,6 @@ class Samples:
             return cls(where, t, values.reshape(len(t), -1, 1))
         return cls(where, t, axes.split(values, where))
 
-    @property
-    def missing(self) -> NDArray[np.bool_]:
-        """(n, taxels) which taxels lack a value of an axis."""
-        return np.asarray(~np.isfinite(self.values).all(axis=2))
-
     def in_order(
         self,
         frame: str = "frame",
@@ -221,11 +216,8 @@ def rest_of(trials: Sequence[Samples], options: ValueOptions) -> Rest:
     says which values are missing, or are lost.
 
     Raises:
-        InputError: the options exclude each other, or most trials lack one; the sentence
-            names it.
+        InputError: most trials lack an option; the sentence names it.
     """
-    if options.falls and options.signed:
-        raise InputError("--falls and --signed exclude each other; give one")
     codes = _say_missing(trials, options.missing)
     rest = Rest(scale=options.scale)
     if options.falls or options.signed:
@@ -269,7 +261,7 @@ def _say_missing(trials: Sequence[Samples], stand_in: float | None) -> list[floa
     missing = 0
     for trial in trials:
         trial.values[trial.values == stand_in] = math.nan
-        missing += int(trial.missing.sum())
+        missing += int((~np.isfinite(trial.values)).any(axis=2).sum())
     if missing:
         say(
             f"missing: {counted(missing, 'value')}, where a taxel is not valid in its "
@@ -297,12 +289,11 @@ def _say_missing(trials: Sequence[Samples], stand_in: float | None) -> list[floa
 def _quietest(trials: Sequence[Samples], options: ValueOptions) -> NDArray[np.float64]:
     """(taxels, axes) the values of the quietest start, of those that lack fewest."""
     starts = np.array([np.median(trial.values[:START], axis=0) for trial in trials])
-    unrest = -starts[..., 0]
-    if options.signed:
-        usual = pd.DataFrame(starts[..., 0]).median().to_numpy()
-        unrest = np.abs(unrest + usual)
+    normal = pd.DataFrame(starts[..., 0])
+    usual = normal.median() if options.signed else normal.max()
+    unrest = (normal - usual).abs().sum(axis=1)
     unknown = ~np.isfinite(starts).all(axis=2)
-    first = np.lexsort([np.nansum(unrest, axis=1), unknown.sum(axis=1)])[0]
+    first = np.lexsort([unrest, unknown.sum(axis=1)])[0]
     lost = int(unknown[first].sum())
     if lost:
         say(f"{counted(lost, 'taxel')} without a value at rest, which is never valid")
@@ -311,9 +302,9 @@ def _quietest(trials: Sequence[Samples], options: ValueOptions) -> NDArray[np.fl
 
 def _finest(deviations: Sequence[NDArray[np.float64]]) -> float:
     """The counts a unit that make all deviations whole, or else use all counts."""
-    largest = max(_largest(d[..., :1]) for d in deviations)
+    normal = max(_largest(d[..., :1]) for d in deviations)
     shear = max(_largest(d[..., 1:]) for d in deviations)
-    largest = max(largest, shear * MOST_COUNTS / MOST_SHEAR)
+    largest = max(normal, shear * MOST_COUNTS / MOST_SHEAR)
     for decimals in range(DECIMALS + 1):
         scale = 10.0**decimals
         if scale * largest > MOST_COUNTS:

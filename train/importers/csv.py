@@ -101,8 +101,8 @@ def trials(
         for line in PANDAS.splitlines():
             say(line)
     else:
-        kind = "folder of frames" if options.frames else f"file {', '.join(SUFFIXES)}"
-        raise InputError(f"{path}: holds no {kind}; give a folder of trials")
+        files = f"file {', '.join(SUFFIXES)}, or folder of them with --frames"
+        raise InputError(f"{path}: holds no {files}; give a folder of trials")
 
 
 def _recorded(
@@ -150,8 +150,7 @@ def _announced(
     first = usable[0]
     taxels = len(first.meaning.taxels)
     in_skin = skin.whole("rows", 1), skin.whole("cols", taxels)
-    shape_in_file = first.meaning.shape or in_skin
-    shape = skin_shape(first.samples, shape_in_file, options)
+    shape = skin_shape(first.samples, first.meaning.shape or in_skin, options)
     text = first.meaning.text(first.label, shape)
     say("; ".join([text, *first.form]))
     if options.axes is not None:

@@ -37,13 +37,14 @@ def add_value_options(parser: argparse.ArgumentParser) -> None:
         metavar="ROWSxCOLS",
         help="of the skin (default: as the file tells it, or one row)",
     )
-    add(
+    sense = parser.add_mutually_exclusive_group().add_argument
+    sense(
         "--falls",
         action="store_true",
         help="values fall under pressure: subtract them from those at rest, which are "
         "those of the trial with the quietest start",
     )
-    add(
+    sense(
         "--signed",
         action="store_true",
         help="values rise and fall: count how far they are from those at rest",
@@ -66,7 +67,7 @@ def add_value_options(parser: argparse.ArgumentParser) -> None:
     add(
         "--flip",
         type=str.lower,
-        choices=["x", "y", "z", "xy", "xz", "yz", "xyz"],
+        choices="x y z xy xz yz xyz".split(),
         metavar="XYZ",
         help="letters of the axes whose sign is turned round",
     )

@@ -363,8 +363,7 @@ def read_unpacked(path: Path) -> bytes:
     Raises:
         InputError: it cannot be read, or is too large.
     """
-    data = read_bytes(path, LARGEST_BYTES)
-    file: Any = io.BytesIO(data)
+    file: Any = io.BytesIO(read_bytes(path, LARGEST_BYTES))
     suffix = path.suffix.lower()
     if suffix == ".zip":
         archive = zipfile.ZipFile(file)
@@ -377,11 +376,11 @@ def read_unpacked(path: Path) -> bytes:
     elif suffix in UNPACKERS:
         file = UNPACKERS[suffix](file)
     with file:
-        data = file.read(LARGEST_BYTES + 1)
-    if len(data) > LARGEST_BYTES:
+        unpacked: bytes = file.read(LARGEST_BYTES + 1)
+    if len(unpacked) > LARGEST_BYTES:
         megabytes = LARGEST_BYTES >> 20
         raise InputError(f"{path}: holds more than {megabytes} MB; save it in parts")
-    return data
+    return unpacked
 
 
 def _decoded(data: bytes) -> tuple[str, list[str]]:

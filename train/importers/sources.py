@@ -323,8 +323,7 @@ def _trials_in(table: Table, options: TableOptions) -> Iterator[Source | Refused
         where = f"{table.where}: trial {name}"
         labels = _labels_in(where, rows[tasks])
         data = rows.drop(columns=["trial", *tasks])
-        names = tuple(table.names)
-        part = replace(table, where=where, data=data, file_names=names)
+        part = replace(table, where=where, data=data, file_names=tuple(table.names))
         return Source(str(name), _wide(part, options), labels, label)
 
     trials = table.data.groupby("trial", sort=False)
@@ -363,7 +362,14 @@ def _wide(table: Table, options: TableOptions) -> Table:
         return table
     require_filled(table.where, table.data, "taxel")
     further = [name for name in table.names if name not in ("taxel", "value")]
-    time = _time_of_long(table, further, options.time)
+    times = named_times(table) or further
+    if options.time:
+        times = columns(table, options.time)
+    if len(times) != 1:
+        raise InputError(
+            f"{table.where}: needs a time beside taxel and value, which --time names"
+        )
+    time = times[0]
     _check_long(table, time)
     wide = table.data.pivot(index=time, columns="taxel", values="value")
     wide = wide[sorted(wide.columns, key=_natural)].rename(columns=_plain)
@@ -376,21 +382,6 @@ def _wide(table: Table, options: TableOptions) -> Table:
         form=(*table.form, *form),
         file_names=tuple(wide.columns),
     )
-
-
-def _time_of_long(
-    table: Table,
-    further: Sequence[str],
-    terms: str | None,
-) -> str:
-    times = named_times(table) or further
-    if terms:
-        times = columns(table, terms)
-    if len(times) != 1:
-        raise InputError(
-            f"{table.where}: needs a time beside taxel and value, which --time names"
-        )
-    return times[0]
 
 
 def _check_long(table: Table, time: str) -> None:

@@ -62,13 +62,11 @@ class Table:
             arrays[name.rpartition(".")[0]].append(name)
         return arrays
 
-    def numbers(self, names: Iterable[str]) -> NDArray[np.float64]:
+    def numbers(self, names: Sequence[str]) -> NDArray[np.float64]:
         """(rows, names) the numbers of some columns, as `numbers_of`."""
         return np.column_stack([numbers_of(self, name) for name in names])
 
-    def values(self, taxels: Sequence[str]) -> NDArray[np.float64]:
-        """(rows, taxels) the values of some taxels."""
-        return self.numbers(taxels)
+    values = numbers
 
 
 @contextmanager

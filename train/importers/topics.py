@@ -198,10 +198,7 @@ class Log:
         """Why a log has no frames, behind a sentence."""
         for topic, reasons in self._left_out.items():
             return f": {topic} {reasons[0]}"
-        return (
-            f"; they must be {IMAGE}, {ARRAYS[2]} or another array, or a message of a "
-            "sensor's own with --field"
-        )
+        return f"; they must be {IMAGE}, an array, or a sensor's own with --field"
 
     def _stated_shape(self, shape: tuple[int, ...]) -> tuple[int, ...]:
         """The rows and columns that frames of a shape tell, or else the file beside the

@@ -120,11 +120,17 @@ def test_what_is_not_three_axes_is_one_sentence(
     assert not out.exists()
 
 
-@pytest.mark.parametrize("text", ["xy", "xxyz", "abc"])
-def test_letters_that_are_no_axes_are_refused(text, tmp_path, capsys):
+@pytest.mark.parametrize(
+    ("options", "sentence"),
+    [
+        (("--axes", "xxyz"), "choose from 'xyz', 'xzy'"),
+        (("--falls", "--signed"), "not allowed with argument"),
+    ],
+)
+def test_options_that_are_at_odds_are_refused(options, sentence, tmp_path, capsys):
     with pytest.raises(SystemExit):
-        main(["import", "csv", "x", "--out", str(tmp_path / "o"), "--axes", text])
-    assert "choose from 'xyz', 'xzy'" in capsys.readouterr().err
+        main(["import", "csv", "x", "--out", str(tmp_path / "o"), *options])
+    assert sentence in capsys.readouterr().err
 
 
 def test_shear_beyond_its_range_is_refused(folder, refusal):

@@ -157,12 +157,7 @@ def test_a_number_that_stands_for_missing_values_is_named_and_may_be_told(capsys
     rest_of([touch], ValueOptions())
     assert "1 value of 65535 stand alone" in capsys.readouterr().out
     rest_of([touch], ValueOptions(missing=65535.0))
-    assert touch.missing.tolist() == [[False, True], [False, False]]
-
-
-def test_values_cannot_fall_and_be_signed():
-    with pytest.raises(InputError, match="exclude each other"):
-        rest_of([trial([1])], ValueOptions(falls=True, signed=True))
+    assert np.isnan(touch.values[..., 0]).tolist() == [[False, True], [False, False]]
 
 
 def test_a_shape_is_rows_and_columns():

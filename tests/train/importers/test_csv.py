@@ -248,7 +248,7 @@ RATE = ("--rate", "1")
         (
             {"a.csv": "1 2\n"},
             ("--frames",),
-            "in: holds no folder of frames; give a folder of",
+            "or folder of them with --frames; give a folder of",
         ),
         (
             {"a/0.csv": "1 2\n", "a/b.csv": "1 2\n"},
