@@ -26,8 +26,10 @@ TIME = re.compile(
     re.IGNORECASE,
 )
 """Names of a column of times, with its unit if they tell it."""
-DATE = re.compile(r"(?a)(?:[\d./-]+[T ] *)?\d\d?:\d\d")
-"""How a time of the day begins, with a date before it or without one."""
+DATE = re.compile(r"(?a)(?:[\d./-]+[T ] *)?\d\d?:\d\d[:.,]\d")
+"""How a time of the day with seconds begins, with a date before it or without one."""
+MINUTES = r"(?<!:)\b(\d+:\d+[.,])"
+"""How minutes and seconds with a fraction begin, as Excel writes them."""
 RUNNING = (
     r"\A(?P<stem>.*?)(?P<first>\d{1,9})"
     r"(?:(?:[_x]|, ?|\]\[)(?P<second>\d{1,9}))?\]?\Z"
@@ -219,11 +221,7 @@ def _taxels(
     complete = [names for names in arrays if len(names) == math.prod(table.shape)]
     if table.shape and len(complete) == 1:
         return complete[0], ()
-    if not rest:
-        raise InputError(
-            f"{table.where}: no column is left for taxels beside the time and the joints"
-        )
-    if not table.named:
+    if rest and not table.named:
         return rest, ()
     candidates = set(table.candidates)
     return _running(table, list(filter(candidates.__contains__, rest)))
@@ -322,7 +320,8 @@ def times_of(
         return np.asarray(np.arange(len(table.data)) / rate_hz)
     if meaning.unit == "iso":
         column = table.data[meaning.time]
-        dates = pd.to_datetime(column, errors="coerce", format="mixed", utc=True)
+        texts = column.astype(str).str.replace(MINUTES, r"00:\1", regex=True)
+        dates = pd.to_datetime(texts, errors="coerce", format="mixed", utc=True)
         require_converted(table, meaning.time, dates, "no time of the day")
         seconds = (dates - dates.iloc[0]).dt.total_seconds()
     else:

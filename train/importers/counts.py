@@ -178,10 +178,13 @@ class Rest:
         is_exact = self.scale == 1.0 and self.values is None
         for counts in self._counts(trial):
             whole = np.rint(counts)
-            is_within = 0.0 <= whole[..., 0].min() <= whole[..., 0].max() <= MOST_COUNTS
-            if not is_within or _largest(whole[..., 1:]) > MOST_SHEAR:
-                return False
-            if is_exact and not np.array_equal(counts, whole):
+            normal = whole[..., 0]
+            if (
+                normal.min() < 0.0
+                or normal.max() > MOST_COUNTS
+                or _largest(whole[..., 1:]) > MOST_SHEAR
+                or (is_exact and not np.array_equal(counts, whole))
+            ):
                 return False
         return True
 

@@ -151,8 +151,7 @@ def _announced(
     taxels = len(first.meaning.taxels)
     in_skin = skin.whole("rows", 1), skin.whole("cols", taxels)
     shape = skin_shape(first.samples, first.meaning.shape or in_skin, options)
-    text = first.meaning.text(first.label, shape)
-    say("; ".join([text, *first.form]))
+    say("; ".join([first.meaning.text(first.label, shape), *first.form]))
     if options.axes is not None:
         say(options.axes.text)
     if len({str(trial.labels) for trial in usable}) == len(usable) > FEWEST_ALONE:
@@ -187,9 +186,8 @@ def _understood(source: Source, options: TableOptions) -> Measured:
     axes = options.axes
     table = source.table if axes is None else parted(source.table, axes.normal)
     sense = meaning(table, options)
-    values = table.values(sense.taxels)
     t = times_of(table, sense, options)
-    samples = Samples.of(table.where, t, values, axes)
+    samples = Samples.of(table.where, t, table.values(sense.taxels), axes)
     if np.isnan(samples.values[..., 0]).all():
         raise InputError(f"{table.where}: none of its values is a finite number")
     rows = table.data.index

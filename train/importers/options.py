@@ -10,8 +10,6 @@ from edge.commands.options import within
 from train.importers.axes import LETTERS, Axes
 
 UNITS_S = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
-FASTEST_HZ = 1e6
-"""A higher frame rate must be a mistake."""
 
 
 def shape_of_skin(text: str) -> tuple[int, int]:
@@ -75,9 +73,14 @@ def add_value_options(parser: argparse.ArgumentParser) -> None:
 
 def add_table_options(parser: argparse.ArgumentParser) -> None:
     """Add options for the facts that a table lacks."""
-    rate = within(float, 1e-3, FASTEST_HZ)
     add = parser.add_argument
-    add("--rate", type=rate, metavar="HZ", help="frames a second, without a time")
+    add(
+        "--rate",
+        # A higher rate must be a mistake.
+        type=within(float, 1e-3, 1e6),
+        metavar="HZ",
+        help="frames a second, without a time",
+    )
     add(
         "--frames",
         action="store_true",

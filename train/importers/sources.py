@@ -37,8 +37,8 @@ TAXEL = re.compile(
     r"(?:taxel|sensor|channel|electrode|cell)(?:[ _]?(?:id|no|nr|number|index))?", re.I
 )
 """Names of the column beside `value` that tells the taxel."""
-SPARSEST = 64
-"""Cells for each value of a long table; more would be nearly empty."""
+SPARSEST = 2
+"""Cells for each value of a long table whose taxels have no times in common."""
 Before = TypeVar("Before")
 After = TypeVar("After")
 
@@ -395,7 +395,7 @@ def _check_long(table: Table, time: str) -> None:
             f"{row[time]}; a column trial would tell trials apart"
         )
     cells = data[time].nunique() * data["taxel"].nunique()
-    if cells > SPARSEST * len(data):
+    if cells >= SPARSEST * len(data):
         raise InputError(
             f"{table.where}: its {len(data)} values would fill {len(data) / cells:.1%} "
             "of a table; the taxels need times in common"

@@ -150,9 +150,9 @@ class Log:
         angles = pd.DataFrame(self._angles.get(joints_topic or "", []), columns=ANGLE)
         times = self._clock(frames, angles)
         axes = self.options.axes
-        t = frames[times].to_numpy()
         values = np.stack(frames["values"])
-        samples = Samples.of(f"{self.path}: {topic}", t, values, axes)
+        where = f"{self.path}: {topic}"
+        samples = Samples.of(where, frames[times].to_numpy(), values, axes)
         samples = samples.in_order("message")
         meta: dict[str, Any] = {
             "labels": dict(self.beside.table("labels", {}).raw),

@@ -146,8 +146,7 @@ def test_shear_beyond_its_range_or_with_fractions_is_refused(
 
 def test_taxels_of_three_axes_are_taken_beside_their_magnitudes(folder, imported):
     magnitudes = np.abs(THREE).sum(axis=2, keepdims=True)
-    forms = "s{}_x s{}_y s{}_z s{}".split()
-    names = [form.format(i + 1) for i in range(TAXELS) for form in forms]
+    names = named("s{i}{a}", ("_x", "_y", "_z", ""))
     write_table(folder, names, np.concatenate([THREE, magnitudes], axis=2))
     recording = imported("--axes", "xyz")
     assert recording.frames[:, 0].tolist() == THREE[..., 2].tolist()
