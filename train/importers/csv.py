@@ -7,12 +7,13 @@ that --taxels names; what was taken and what was ignored is printed. The label i
 name of the folder that the file lies in (or of the one above folders that only count
 trials), or else its own name without the number at the end; `labels.csv`, with the
 column `trial` and one for each task, replaces it. A single file with a column `trial`
-holds all trials. It has such rows, or the columns `taxel` and `value` with a row for
-each value; its columns of text are labels, and that of the task. COLS are names, ranges
-or numbers from 1, such as `s1-s9,force` or `3-5`. `skin.json` in the folder is the
-`skin` of the recordings. With `--frames`, a folder holds a folder for each trial, with
-a file for each frame: a line a row. A file that cannot be used is named and skipped.
-Taxels of three axes are columns such as s1_x, s1_y, s1_z, or three arrays: see --axes.
+holds all trials; its columns of text that stay the same within a trial are labels, and
+that of the task. Any file has such rows, or a row for each value in the columns `taxel`
+(or `sensor_id`) and `value`. COLS are names, ranges or numbers from 1, such as
+`s1-s9,force` or `3-5`. `skin.json` in the folder is the `skin` of the recordings. With
+`--frames`, a folder holds a folder for each trial, with a file for each frame: a line a
+row. A file that cannot be used is named and skipped. Taxels of three axes are columns
+such as s1_x, s1_y, s1_z, or three arrays: see --axes.
 """
 
 import argparse

@@ -124,7 +124,6 @@ def test_values_that_are_all_missing_at_rest_have_no_scale():
     ("values", "options"),
     [
         ([-1.0, 5.0], "--missing -1"),
-        ([-1.0, -2.0], "--signed"),
         ([-1.5, 2.0], "--signed"),
         ([0.5], "--scale 10"),
         ([7e4], "--scale 0.936214"),
