@@ -120,7 +120,10 @@ class _Header:
     @property
     def unique(self) -> list[str]:
         """The names; columns without one are told apart by their places."""
-        return [name or f"column {place}" for place, name in enumerate(self.names, 1)]
+        return [
+            name or f"column {place} unnamed"
+            for place, name in enumerate(self.names, 1)
+        ]
 
     def filled(self, text: _Text) -> list[int]:
         """The places of the columns that have a name or a value."""

@@ -94,7 +94,7 @@ def test_decimal_commas_may_begin_in_any_row(tmp_path):
 def test_a_column_that_only_a_comma_at_the_end_makes_is_no_column(tmp_path):
     assert read(tmp_path, "t,p1,\n0,1,\n1,2,\n").names == ["t", "p1"]
     unnamed = "t,Unnamed: 1,Unnamed: 2,p1\n0,,,1\n1,,7,2\n"
-    assert read(tmp_path, unnamed).names == ["t", "column 3", "p1"]
+    assert read(tmp_path, unnamed).names == ["t", "column 3 unnamed", "p1"]
     assert rows_of(read(tmp_path, "t,p1\n0,1,\n1,2,\n")) == [[0, 1], [1, 2]]
 
 
@@ -120,7 +120,7 @@ def test_an_empty_cell_is_missing(tmp_path):
         ("", "holds no values"),
         ("t;p1\n0,5;1.234\n", "with a comma and with a point, such as 0,5 and 1.234"),
         ("p1,p1\n1,2\n", "two columns are named p1"),
-        (",p1,,column 3\n0,1,2,3\n", "two columns are named column 3"),
+        (",p1,,column 3 unnamed\n0,1,2,3\n", "two columns are named column 3"),
         ("t,p1\n0,1\n0.01\n", "line 3 has 1 value, and the first row 2"),
         ("# t\n\n1 2\n3\n", "line 4 has 1 value, and the first row 2"),
         (b"1 2\0\n", "it is not text"),
@@ -153,7 +153,7 @@ def test_the_index_of_a_parquet_table_is_a_column(tmp_path):
 
 def test_columns_without_a_name_are_told_apart_by_their_places(tmp_path):
     table = read(tmp_path, ",t,,p1,\n0,0,7,1,\n1,1,8,2,\n")
-    assert table.names == ["column 1", "t", "column 3", "p1"]
+    assert table.names == ["column 1 unnamed", "t", "column 3 unnamed", "p1"]
 
 
 def test_a_long_text_is_held_once():
