@@ -303,9 +303,10 @@ def _refuse_thousands(text: _Text) -> None:
     for cells in zip(*(row for _, row in _rows(lines, text.mark)), strict=False):
         column = " ".join(cells)
         fractions = re.findall(r"\S*\.\S*", column)
+        if len(fractions) < FEWEST_THOUSANDS:
+            continue
         whole = re.search(r"(?<!\S)[1-9]\d\d(?!\S)", column)
-        are_alike = all(map(THOUSANDS.fullmatch, fractions))
-        if whole and are_alike and len(fractions) >= FEWEST_THOUSANDS:
+        if whole and all(map(THOUSANDS.fullmatch, fractions)):
             raise InputError(
                 f"has numbers with a point for thousands, such as {fractions[0]} beside "
                 f"{whole[0]}; save it without them"
