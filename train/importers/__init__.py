@@ -25,6 +25,7 @@ SHARED = {
     "options",
     "reading",
     "sources",
+    "tables",
     "topics",
 }
 """Modules that the formats share."""

@@ -18,14 +18,8 @@ from edge.errors import InputError, about
 from edge.files import parsing, read_bytes
 from train.importers.columns import TIME
 from train.importers.options import TableOptions
-from train.importers.reading import (
-    EMPTY,
-    LARGEST_BYTES,
-    Table,
-    needs,
-    numbered,
-    require_unique,
-)
+from train.importers.reading import LARGEST_BYTES
+from train.importers.tables import EMPTY, Table, needs, numbered, require_unique
 
 SUFFIXES = (".npy", ".npz", ".mat", ".h5", ".hdf5")
 MOST_VALUES = 1 << 25
@@ -170,13 +164,8 @@ def _numbers(arrays: Arrays, options: TableOptions) -> Arrays:
         if is_used and array.dtype.kind in "iufb" and array.size:
             numbers[name] = array.ravel() if _is_vector(array) else array
     if not numbers:
-        raise _without_numbers(arrays)
+        raise InputError(f"{EMPTY}; where it holds cells or structures, give --trials")
     return numbers
-
-
-def _without_numbers(arrays: Arrays) -> InputError:
-    has_cells = any(array.dtype.hasobject for array in arrays.values())
-    return InputError("holds cells or structures; give --trials" * has_cells or EMPTY)
 
 
 def _is_vector(array: NDArray[Any]) -> bool:
@@ -217,14 +206,10 @@ def _time_axis(title: str, array: NDArray[Any], frames: int, axis: int | None) -
     places = [place for place, size in enumerate(array.shape) if size == frames]
     if axis in places:
         places = [axis]
-    if not places:
+    if len(places) != 1:
         raise InputError(
-            f"{title} of {array.shape} has no axis of {frames} frames; name those to be "
-            "used by --taxels and --joints, or give --axis"
-        )
-    if len(places) > 1:
-        raise InputError(
-            f"which axis of {title} {array.shape} is the time? Give --axis"
+            f"which axis of {title} {array.shape} is the time of {frames} frames? Give "
+            "--axis, or name the arrays to be used by --taxels and --joints"
         )
     if array.ndim > 3:
         raise InputError(

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from edge.config import short_text
 from edge.errors import InputError
-from train.importers.reading import Table, numbered
+from train.importers.tables import Table, numbered
 
 LETTERS = list("xyz")
 LAST = re.compile(r"(?P<word>.*?\d)(?P<rest>)[ _.-]*(?P<axis>[xyz])", re.I)
@@ -87,6 +87,11 @@ class Parted(Table):
     whole: Table
     axes: pd.DataFrame
 
+    @property
+    def candidates(self) -> list[str]:
+        """The names of the taxels that have three axes."""
+        return list(self.axes.index)
+
     def values(self, names: Sequence[str]) -> NDArray[np.float64]:
         """(n, taxels, 3) values x, y and z of some taxels.
 
@@ -97,7 +102,7 @@ class Parted(Table):
             if name not in self.axes.index:
                 raise InputError(f"{self.where}: taxel {name} has one axis alone")
         columns = self.axes.loc[list(names)].to_numpy()
-        return self.whole.numbers(columns.flat).reshape(-1, *columns.shape)
+        return self.whole.numbers(columns.ravel()).reshape(-1, *columns.shape)
 
 
 def lettered(name: str) -> tuple[str, str] | None:
@@ -134,14 +139,10 @@ def parted(table: Table, normal: str) -> Parted:
         )
     taxel_of = dict(zip(axes[normal], axes.index, strict=True))
     plain = table.data.drop(columns=axes.to_numpy().ravel())
+    # A magnitude may have the taxel's name.
+    plain = plain.rename(columns={name: f"{name} without axes" for name in axes.index})
     normals = table.data[[name for name in table.names if name in taxel_of]]
     data = pd.concat([plain, normals.rename(columns=taxel_of)], axis=1)
-    if not data.columns.is_unique:
-        twice = data.columns[data.columns.duplicated()][0]
-        raise InputError(
-            f"{table.where}: {twice} names a column and a taxel of three axes; rename one "
-            "of them"
-        )
     normal_table = replace(table, data=data, shape=shape, file_names=())
     return Parted(**vars(normal_table), whole=table, axes=axes)
 

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from edge.commands.output import counted
 from edge.errors import InputError
+from edge.touch.layout import RELEASE_S
 from train.progress import say
 
 JITTER_STEPS = 0.5
@@ -36,7 +37,8 @@ class Order:
 
     Attributes:
         kept: (m,) indices of the frames.
-        text: the change that was made, in words; empty for times that increase.
+        text: the change that was made, and steps as of a sparse log, in words; empty
+            for times that increase steadily.
     """
 
     kept: NDArray[np.intp]
@@ -87,7 +89,7 @@ def order(
             f"{where}: its time stands still at {frame} {numbers[still]}; name another "
             "time, or fix the times"
         )
-    changes = []
+    changes = _sparse(forward)
     swapped = int((steps < 0.0).sum())
     if swapped:
         changes.append(f"{counted(swapped, 'time')} went back within the jitter")
@@ -98,11 +100,26 @@ def order(
     return Order(frames[last], "; ".join(changes))
 
 
+def _sparse(steps: NDArray[np.float64]) -> list[str]:
+    """A sentence for steps (n,) as of a log that is not written at all times."""
+    shortest_s = float(np.quantile(steps, 0.1)) if len(steps) else 0.0
+    longest_s = float(steps.max(initial=0.0))
+    if longest_s <= max(RELEASE_S, GAP_STEPS * shortest_s):
+        return []
+    return [
+        f"its steps are {shortest_s:.3g} to {longest_s:.3g} s, as of a log that pauses or "
+        "writes on change alone"
+    ]
+
+
 def angles_at(
     t: NDArray[np.float64],
     joints_t: NDArray[np.float64],
     angles: NDArray[np.float64],
     release_s: float,
+    where: object = "",
+    frame: str = "message",
+    numbers: Sequence[int] | None = None,
 ) -> NDArray[np.float64]:
     """Joint angles (n, dof) at the frames' times.
 
@@ -112,12 +129,18 @@ def angles_at(
 
     Args:
         t: (n,) seconds.
-        joints_t: (m,) seconds of the messages, increasing.
+        joints_t: (m,) seconds of the messages.
         angles: (m, dof) radians.
         release_s: of the skin; a longer step is a gap, unless it is less than five
             usual steps.
+        where, frame, numbers: of the messages, as for `order`.
+
+    Raises:
+        InputError: as `order`.
     """
-    unwrapped = np.unwrap(angles, axis=0)
+    kept = order(joints_t, where, frame, numbers).kept
+    joints_t = joints_t[kept]
+    unwrapped = np.unwrap(angles[kept], axis=0)
     columns = [np.interp(t, joints_t, column) for column in unwrapped.T]
     at_frames = np.stack(columns, axis=1)
     gap_s = release_s

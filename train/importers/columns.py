@@ -16,7 +16,7 @@ from edge.config import short_text
 from edge.errors import InputError
 from train.importers.axes import lettered
 from train.importers.options import UNITS_S, TableOptions
-from train.importers.reading import Table, numbered, numbers_of, require_converted
+from train.importers.tables import Table, numbered, numbers_of, require_converted
 
 OTHER_UNITS = {"sec": "s", "seconds": "s", "µs": "us"}
 """{another name of a unit: its name here}."""
@@ -26,7 +26,10 @@ TIME = re.compile(
     re.IGNORECASE,
 )
 """Names of a column of times, with its unit if they tell it."""
-ISO = re.compile(r"\d{4}-\d\d-\d\d[T ]\d\d:\d\d")
+DATE = re.compile(r"(?a)(?:[\d./-]+[T ] *)?\d\d?:\d\d[:.,]\d")
+"""How a time of the day with seconds begins, with a date before it or without one."""
+MINUTES = r"(?<!:)\b(\d+:\d+[.,])"
+"""How minutes and seconds with a fraction begin, as Excel writes them."""
 RUNNING = (
     r"\A(?P<stem>.*?)(?P<first>\d{1,9})"
     r"(?:(?:[_x]|, ?|\]\[)(?P<second>\d{1,9}))?\]?\Z"
@@ -65,6 +68,11 @@ class Meaning:
     unit_from: str
     are_all: bool = False
 
+    @property
+    def kind(self) -> str:
+        """What all trials of a set have alike."""
+        return f"time in {self.unit} and {len(self.taxels)} taxels {self.taxels}"
+
     def text(self, label: str, shape: Sequence[int]) -> str:
         """A line that says what was taken."""
         size = " x ".join(map(str, shape))
@@ -82,8 +90,8 @@ class Meaning:
 
 
 def quoted(name: str) -> str:
-    """A column's name in quotation marks, or words for a column without one."""
-    return f'"{name}"' if name else "a column without a name"
+    """A column's name in quotation marks."""
+    return f'"{name}"'
 
 
 def spanned(names: Sequence[str]) -> str:
@@ -194,11 +202,11 @@ def named_times(table: Table, joints: Sequence[str] = ()) -> list[str]:
 
 
 def is_date(table: Table, name: str) -> bool:
-    """Whether a column holds dates with times."""
+    """Whether a column holds times of the day, with dates or without."""
     column = table.data[name]
     if pd.api.types.is_numeric_dtype(column) or column.isna().any():
         return False
-    return bool(ISO.match(str(column.iloc[0])))
+    return bool(DATE.match(str(column.iloc[0])))
 
 
 def _taxels(
@@ -213,32 +221,32 @@ def _taxels(
     complete = [names for names in arrays if len(names) == math.prod(table.shape)]
     if table.shape and len(complete) == 1:
         return complete[0], ()
-    if not rest:
-        raise InputError(
-            f"{table.where}: no column is left for taxels beside the time and the joints"
-        )
-    return _running(table, rest) if table.named else (rest, ())
+    if rest and not table.named:
+        return rest, ()
+    candidates = set(table.candidates)
+    return _running(table, list(filter(candidates.__contains__, rest)))
 
 
 def _running(table: Table, rest: Sequence[str]) -> tuple[list[str], tuple[int, ...]]:
     """The taxels by a common stem with running numbers, in the order of the numbers;
     and their shape, where they have two."""
     grids = _grids(*rest)
-    grids = [grid for grid in grids if TAXELS.match(grid[0][0])] or grids
-    grids = [grid for grid in grids if len(grid[0]) > 1] or grids
-    if len(grids) > 1:
+    for is_likely in (lambda names: TAXELS.match(names[0]), lambda names: names[1:]):
+        grids = [grid for grid in grids if is_likely(grid[0])] or grids
+    if len(grids) == 1:
+        return grids[0]
+    if grids:
         spans = " or ".join(spanned(names) for names, _ in grids)
         raise InputError(
             f"{table.where}: are the taxels {spans}? Name them by --taxels, and joint "
             "angles by --joints"
         )
-    if not grids:
-        three = ", or --axes xyz for taxels of three axes" * any(map(lettered, rest))
-        raise InputError(
-            f"{table.where}: no columns are named as taxels, such as s1 to s16; name them "
-            f"by --taxels{three}, among {short_text(list(rest))}"
-        )
-    return grids[0]
+    three = ", or --axes xyz for taxels of three axes" * any(map(lettered, rest))
+    running = ",".join(filter(re.compile(RUNNING).match, rest))
+    raise InputError(
+        f"{table.where}: no columns are named as taxels, such as s1 to s16 without a gap; "
+        f"give --taxels {running or 'COLS'}{three}, among {short_text(list(rest))}"
+    )
 
 
 @cache
@@ -274,7 +282,7 @@ def _unit(
     name = TIME.fullmatch(time)
     unit = options.time_unit or (name["unit"] if name else None)
     if unit == "iso" or (unit is None and is_date(table, time)):
-        return "iso", "ISO dates"
+        return "iso", "times of the day"
     if unit is None:
         return _likely_unit(table, time)
     unit = unit.lower()
@@ -284,10 +292,8 @@ def _unit(
 def _likely_unit(table: Table, time: str) -> tuple[str, str]:
     """The unit of times that only their numbers tell, and how they do."""
     values = numbers_of(table, time).dropna()
-    if values.empty:
-        raise InputError(f"{table.where}: column {time} holds no times")
     for unit, earliest in EPOCHS.items():
-        if abs(values.iloc[0]) >= earliest:
+        if values.max() >= earliest:
             return unit, "since 1970"
     steps = values.diff()
     step = median = steps[steps > 0.0].median()
@@ -314,8 +320,9 @@ def times_of(
         return np.asarray(np.arange(len(table.data)) / rate_hz)
     if meaning.unit == "iso":
         column = table.data[meaning.time]
-        dates = pd.to_datetime(column, errors="coerce", format="ISO8601", utc=True)
-        require_converted(table, meaning.time, dates, "no ISO date")
+        texts = column.astype(str).str.replace(MINUTES, r"00:\1", regex=True)
+        dates = pd.to_datetime(texts, errors="coerce", format="mixed", utc=True)
+        require_converted(table, meaning.time, dates, "no time of the day")
         seconds = (dates - dates.iloc[0]).dt.total_seconds()
     else:
         numbers = numbers_of(table, meaning.time)

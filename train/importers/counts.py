@@ -2,7 +2,7 @@
 
 import logging
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Self
 
@@ -24,8 +24,8 @@ START = 3
 """Frames at the start of a trial, whose median may be the rest value."""
 MOST_COUNTS = 65535
 MOST_SHEAR = 32767
-CODES = (65535.0, 4095.0, -1.0, -999.0)
-"""Numbers that some loggers write for a missing value."""
+CODES = (65535.0, 4095.0)
+"""Numbers that some loggers write for a missing value, beside negative ones."""
 DECIMALS = 6
 """Most decimals that signed values keep."""
 PART = 1 << 16
@@ -68,11 +68,6 @@ class Samples:
             return cls(where, t, values.reshape(len(t), -1, 1))
         return cls(where, t, axes.split(values, where))
 
-    @property
-    def missing(self) -> NDArray[np.bool_]:
-        """(n, taxels) which taxels lack a value of an axis."""
-        return np.asarray(~np.isfinite(self.values).all(axis=2))
-
     def in_order(
         self,
         frame: str = "frame",
@@ -108,9 +103,9 @@ def skin_shape(
     shape = options.shape or stated_shape
     taxels = trial.values.shape[1]
     if len(shape) != 2 or math.prod(shape) != taxels:
-        size = " x ".join(map(str, shape))
+        size = " x ".join(map(str, shape)) if len(shape) == 2 else "known rows of"
         raise InputError(
-            f"{trial.where}: {taxels} values a frame are not {size} taxels; give --shape"
+            f"{trial.where}: {taxels} values a frame are no {size} taxels; give --shape"
         )
     return shape[0], shape[1]
 
@@ -123,11 +118,18 @@ class Rest:
         values: (taxels, axes) at rest; None where they are counts as they stand.
         falls: whether values fall under pressure; otherwise both directions count.
         scale: counts a unit of value.
+        lacking: the options by which all values would be counts.
     """
 
     values: NDArray[np.float64] | None = None
     falls: bool = False
     scale: float = 1.0
+    lacking: str = ""
+
+    @property
+    def base(self) -> NDArray[np.float64] | float:
+        """What is subtracted from values."""
+        return 0.0 if self.values is None else self.values
 
     def recording(
         self,
@@ -145,91 +147,136 @@ class Rest:
         Raises:
             InputError: the values are no counts, or too large.
         """
-        valid = ~trial.missing
-        values = {}
+        if not self.suits(trial):
+            raise self.refusal(trial)
+        skin = {**meta.get("skin", {}), "rows": shape[0], "cols": shape[1]}
+        meta = {**meta, "skin": skin}
         if self.values is not None:
-            valid &= np.isfinite(self.values).all(axis=1)
             normal = self.values[:, 0].tolist()
             at_rest = [None if math.isnan(value) else value for value in normal]
-            values = {"values": {"counts_per_unit": self.scale, "rest": at_rest}}
-        skin = {**meta.get("skin", {}), "rows": shape[0], "cols": shape[1]}
-        axes = trial.values.shape[2]
-        if axes == 3:
-            skin["axes"] = axes
+            meta["values"] = {"counts_per_unit": self.scale, "rest": at_rest}
+        valid = self._valid(trial).reshape(-1, *shape)
         # A part at a time, as a long recording would else fill the memory several
         # times.
-        frames = np.empty((len(valid), *shape), np.uint16)
-        shear = np.empty((*frames.shape, 2), np.int16) if axes == 3 else None
-        for at in range(0, len(valid), PART):
-            part = slice(at, at + PART)
-            counts = self._counts(trial, valid, part).reshape(-1, *shape, axes)
-            frames[part] = counts[..., 0]
-            if shear is not None:
-                shear[part] = counts[..., 1:]
+        parts = [np.rint(part).astype(np.int32) for part in self._counts(trial)]
+        counts = np.concatenate(parts).reshape(*valid.shape, -1)
+        axes = counts.shape[3]
+        if axes == 3:
+            skin["axes"] = axes
         return Recording(
             t=trial.t - trial.t[0],
-            frames=frames,
+            frames=counts[..., 0].astype(np.uint16),
             joints=trial.joints,
-            valid=None if valid.all() else valid.reshape(-1, *shape),
-            meta={**meta, "skin": skin, **values},
-            shear=shear,
+            valid=None if valid.all() else valid,
+            meta=meta,
+            shear=counts[..., 1:].astype(np.int16) if axes == 3 else None,
         )
 
-    def _counts(
-        self,
-        trial: Samples,
-        valid: NDArray[np.bool_],
-        rows: slice,
-    ) -> NDArray[np.int32]:
-        """Whole counts (rows, taxels, axes) of some frames; 0 where not valid."""
-        at_rest = 0.0 if self.values is None else self.values
-        moved = np.where(valid[rows, :, None], trial.values[rows] - at_rest, 0.0)
-        counts = moved * self.scale
-        if self.values is not None:
-            normal = counts[..., 0]
-            counts[..., 0] = np.maximum(-normal, 0.0) if self.falls else abs(normal)
-        exact = self.scale == 1.0 and self.values is None
-        _check_counts(trial.where, counts, exact)
-        return np.rint(counts).astype(np.int32)
+    def suits(self, trial: Samples) -> bool:
+        """Whether a trial's values become counts within their range, which are whole
+        where no scale makes them so."""
+        is_exact = self.scale == 1.0 and self.values is None
+        for counts in self._counts(trial):
+            whole = np.rint(counts)
+            normal = whole[..., 0]
+            if (
+                normal.min() < 0.0
+                or normal.max() > MOST_COUNTS
+                or _largest(whole[..., 1:]) > MOST_SHEAR
+                or (is_exact and not np.array_equal(counts, whole))
+            ):
+                return False
+        return True
+
+    def refusal(self, trial: Samples) -> InputError:
+        """Why a trial's values do not suit."""
+        finite = trial.values[np.isfinite(trial.values)]
+        return InputError(
+            f"{trial.where}: {finite.min():g} to {finite.max():g} are no counts (whole "
+            f"numbers from 0 to {MOST_COUNTS}, of shear to {MOST_SHEAR}); add "
+            f"{self.lacking}, or see --falls and --taxels"
+        )
+
+    def _valid(self, trial: Samples) -> NDArray[np.bool_]:
+        """(n, taxels) which taxels have a value, and one at rest."""
+        return np.asarray(np.isfinite(trial.values - self.base).all(axis=2))
+
+    def _counts(self, trial: Samples) -> Iterator[NDArray[np.float64]]:
+        """Counts (rows, taxels, axes) of some frames after another, 0 where not valid."""
+        valid = self._valid(trial)[..., None]
+        for at in range(0, len(valid), PART):
+            part = slice(at, at + PART)
+            moved = trial.values[part] - self.base
+            counts = np.where(valid[part], moved, 0.0) * self.scale
+            if self.values is not None:
+                normal = counts[..., 0]
+                counts[..., 0] = np.maximum(-normal, 0.0) if self.falls else abs(normal)
+            yield counts
 
 
 def rest_of(trials: Sequence[Samples], options: ValueOptions) -> Rest:
-    """The values at rest, and the scale that keeps all digits of signed ones; says
-    which values are missing, or are lost.
+    """The values at rest, and the scale that keeps all digits of those that are moved;
+    says which values are missing, or are lost.
 
     Raises:
-        InputError: the options exclude each other.
+        InputError: most trials lack an option; the sentence names it.
     """
-    if options.falls and options.signed:
-        raise InputError("--falls and --signed exclude each other; give one")
-    _say_missing(trials, options.missing)
-    if not (options.falls or options.signed):
-        return Rest(scale=options.scale)
-    values = _quietest(trials, options)
-    deviations = [(trial.values - values)[..., 0] for trial in trials]
-    if options.falls:
-        _say_lost(deviations)
-        return Rest(values, falls=True, scale=options.scale)
-    scale = _finest(deviations) if options.scale == 1.0 else options.scale
-    return Rest(values, scale=scale)
+    codes = _say_missing(trials, options.missing)
+    rest = Rest(scale=options.scale)
+    if options.falls or options.signed:
+        rest = _moved(trials, options)
+    refused = [trial for trial in trials if not rest.suits(trial)]
+    if refused:
+        rest = replace(rest, lacking=_lacking(refused, rest, codes))
+    if 2 * len(refused) > len(trials):
+        raise rest.refusal(refused[0])
+    return rest
 
 
-def _say_missing(trials: Sequence[Samples], stand_in: float | None) -> None:
-    """Take away the values that stand for missing ones, and say how many are missing,
-    and which others stand alone as such values do."""
+def _moved(trials: Sequence[Samples], options: ValueOptions) -> Rest:
+    """How values become counts that are told from those at rest; says which are lost."""
+    rest = Rest(_quietest(trials, options), options.falls, options.scale)
+    deviations = [trial.values - rest.base for trial in trials]
+    rise = max(np.fmax.reduce(d, axis=None, initial=0.0) for d in deviations)
+    if options.falls and rise > 0.0:
+        say(f"values above those at rest, by up to {rise:g}, count as 0; see --signed")
+    return replace(rest, scale=_finest(deviations)) if rest.scale == 1.0 else rest
+
+
+def _lacking(trials: Sequence[Samples], rest: Rest, codes: Sequence[float]) -> str:
+    """The options by which the values of some trials would be counts."""
+    words = [f"--missing {code:g}" for code in codes]
+    values = [
+        np.where(np.isin(trial.values, codes), math.nan, trial.values - rest.base)
+        for trial in trials
+    ]
+    finest = _finest(values)
+    if rest.values is None and any((v[..., 0] < 0.0).any() for v in values):
+        words.append("--signed")
+    elif finest != rest.scale:
+        words.append(f"--scale {finest:g}")
+    return " ".join(words)
+
+
+def _say_missing(trials: Sequence[Samples], stand_in: float | None) -> list[float]:
+    """Take away the values that stand for missing ones, and say how many are missing;
+    the others that stand alone as such values do, which are said."""
     missing = 0
     for trial in trials:
         trial.values[trial.values == stand_in] = math.nan
-        missing += int(trial.missing.sum())
+        missing += int((~np.isfinite(trial.values)).any(axis=2).sum())
     if missing:
         say(
             f"missing: {counted(missing, 'value')}, where a taxel is not valid in its "
             "frame"
         )
-    values = np.concatenate([trial.values.ravel() for trial in trials])
-    for code in CODES:
-        others = values[np.isfinite(values) & (values != code)]
-        count = int((values == code).sum())
+    values = np.concatenate([trial.values[..., 0].ravel() for trial in trials])
+    values = values[np.isfinite(values)]
+    codes = []
+    lowest = float(values.min(initial=0.0))
+    for code in (*CODES, lowest if lowest.is_integer() else 0.0):
+        others = values[values != code]
+        count = len(values) - len(others)
         if not count or not others.size:
             continue
         if code < 0.0 <= others.min() or code - others.max() > np.ptp(others):
@@ -237,24 +284,19 @@ def _say_missing(trials: Sequence[Samples], stand_in: float | None) -> None:
                 f"{counted(count, 'value')} of {code:g} stand alone; if they are missing, "
                 f"give --missing {code:g}"
             )
-
-
-def _say_lost(deviations: Sequence[NDArray[np.float64]]) -> None:
-    """Say how far values rise that only count as they fall."""
-    rise = max(np.fmax.reduce(d, axis=None, initial=0.0) for d in deviations)
-    if rise > 0.0:
-        say(f"values above those at rest, by up to {rise:g}, count as 0; see --signed")
+            codes.append(code)
+            values = others
+    return codes
 
 
 def _quietest(trials: Sequence[Samples], options: ValueOptions) -> NDArray[np.float64]:
     """(taxels, axes) the values of the quietest start, of those that lack fewest."""
     starts = np.array([np.median(trial.values[:START], axis=0) for trial in trials])
-    unrest = -starts[..., 0]
-    if options.signed:
-        usual = pd.DataFrame(starts[..., 0]).median().to_numpy()
-        unrest = np.abs(unrest + usual)
+    normal = pd.DataFrame(starts[..., 0])
+    usual = normal.median() if options.signed else normal.max()
+    unrest = (normal - usual).abs().sum(axis=1)
     unknown = ~np.isfinite(starts).all(axis=2)
-    first = np.lexsort([np.nansum(unrest, axis=1), unknown.sum(axis=1)])[0]
+    first = np.lexsort([unrest, unknown.sum(axis=1)])[0]
     lost = int(unknown[first].sum())
     if lost:
         say(f"{counted(lost, 'taxel')} without a value at rest, which is never valid")
@@ -263,7 +305,9 @@ def _quietest(trials: Sequence[Samples], options: ValueOptions) -> NDArray[np.fl
 
 def _finest(deviations: Sequence[NDArray[np.float64]]) -> float:
     """The counts a unit that make all deviations whole, or else use all counts."""
-    largest = max(_largest(d) for d in deviations)
+    normal = max(_largest(d[..., :1]) for d in deviations)
+    shear = max(_largest(d[..., 1:]) for d in deviations)
+    largest = max(normal, shear * MOST_COUNTS / MOST_SHEAR)
     for decimals in range(DECIMALS + 1):
         scale = 10.0**decimals
         if scale * largest > MOST_COUNTS:
@@ -277,23 +321,3 @@ def _finest(deviations: Sequence[NDArray[np.float64]]) -> float:
 def _largest(values: NDArray[np.float64]) -> float:
     """The largest absolute value that is not missing; 0 without one."""
     return float(np.fmax.reduce(np.abs(values), axis=None, initial=0.0))
-
-
-def _check_counts(where: str, counts: NDArray[np.float64], exact: bool) -> None:
-    """Refuse values that are no counts."""
-    shear = _largest(np.rint(counts[..., 1:]))
-    if shear > MOST_SHEAR:
-        raise InputError(
-            f"{where}: shear reaches {shear:.0f} counts, and at most {MOST_SHEAR} are "
-            "kept; give a smaller --scale"
-        )
-    normal = counts[..., 0]
-    low = normal.min()
-    high = normal.max()
-    is_whole = not exact or np.array_equal(normal, np.rint(normal))
-    if low < 0.0 or high > MOST_COUNTS + 0.5 or not is_whole:
-        hint = "--missing, --signed, " if low < 0.0 else ""
-        raise InputError(
-            f"{where}: {low:g} to {high:g} are no counts (whole numbers from 0 to "
-            f"65535); see {hint}--falls, --scale and --taxels"
-        )

@@ -7,12 +7,13 @@ that --taxels names; what was taken and what was ignored is printed. The label i
 name of the folder that the file lies in (or of the one above folders that only count
 trials), or else its own name without the number at the end; `labels.csv`, with the
 column `trial` and one for each task, replaces it. A single file with a column `trial`
-holds all trials. It has such rows, or the columns `taxel` and `value` with a row for
-each value; its columns of text are labels, and that of the task. COLS are names, ranges
-or numbers from 1, such as `s1-s9,force` or `3-5`. `skin.json` in the folder is the
-`skin` of the recordings. With `--frames`, a folder holds a folder for each trial, with
-a file for each frame: a line a row. A file that cannot be used is named and skipped.
-Taxels of three axes are columns such as s1_x, s1_y, s1_z, or three arrays: see --axes.
+holds all trials; its columns of text that stay the same within a trial are labels, and
+that of the task. Any file has such rows, or a row for each value in the columns `taxel`
+(or `sensor_id`) and `value`. COLS are names, ranges or numbers from 1, such as
+`s1-s9,force` or `3-5`. `skin.json` in the folder is the `skin` of the recordings. With
+`--frames`, a folder holds a folder for each trial, with a file for each frame: a line a
+row. A file that cannot be used is named and skipped. Taxels of three axes are columns
+such as s1_x, s1_y, s1_z, or three arrays: see --axes.
 """
 
 import argparse
@@ -27,7 +28,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from edge.config import ConfigTable, short_text
+from edge.config import ConfigTable
 from edge.errors import InputError
 from edge.touch.arm import Chain
 from edge.touch.layout import RELEASE_S
@@ -44,6 +45,18 @@ FEWEST_ROWS = 8
 """Rows of a trial from which on a column is seen to count them."""
 FEWEST_ALONE = 3
 """Trials that may all have another label."""
+FIRST_WORDS = (
+    "this line, run in their folder, takes the first word of each name: (echo trial,%s; "
+    'for f in *_*; do echo "${f%%.*},${f%%%%_*}"; done) > labels.csv'
+)
+PANDAS = """\
+Where no option helps, five lines of pandas make a recording of a table:
+import edge, pandas
+table = pandas.read_csv("cup_1.csv")  # sep=";", decimal=",", thousands="."
+frames = table[["s1", "s2"]].round().astype(int).to_numpy()  # from 0 to 65535
+meta = {"skin": {"rows": 1, "cols": frames.shape[1]}, "labels": {"object": "cup"}}
+edge.save("cup_1.npz", edge.Recording(table["t"].to_numpy(), frames, meta=meta))"""
+"""What is printed where no table is clear."""
 add_options = add_table_options
 
 
@@ -80,30 +93,42 @@ def trials(
     """
     options = TableOptions.of(arguments)
     understood = partial(_understood, options=options)
-    measured = list(tried(sources_in(path, options), understood, options.strict))
-    if not measured:
-        kind = "folder of frames" if options.frames else f"file {', '.join(SUFFIXES)}"
-        raise InputError(f"{path}: holds no {kind}; give a folder of trials")
-    return _recorded(path, arm, _alike(measured, options.strict), options)
+    results = list(tried(sources_in(path, options), understood, options.strict))
+    yield from (result for result in results if isinstance(result, Refused))
+    measured = [result for result in results if isinstance(result, Measured)]
+    if measured:
+        yield from _recorded(path, arm, measured, options)
+    elif results:
+        for line in PANDAS.splitlines():
+            say(line)
+    else:
+        files = f"file {', '.join(SUFFIXES)}, or folder of them with --frames"
+        raise InputError(f"{path}: holds no {files}; give a folder of trials")
 
 
 def _recorded(
     path: Path,
     arm: Chain | None,
-    alike: Sequence[Measured | Refused],
+    measured: Sequence[Measured],
     options: TableOptions,
 ) -> Iterator[Trial | Refused]:
-    """The recordings of trials; prints what was taken."""
-    usable = [trial for trial in alike if isinstance(trial, Measured)]
-    if not usable:
-        yield from (result for result in alike if isinstance(result, Refused))
-        return
+    """The recordings of trials, without those whose columns are not those of most of
+    them; prints what was taken."""
+    kind = mode(trial.meaning.kind for trial in measured)
+    usable = [trial for trial in measured if trial.meaning.kind == kind]
     folder = path if path.is_dir() else path.parent
     skin = json_table(folder / SKIN)
+    if usable[0].meaning.are_all:
+        _require_taxels(usable)
     shape = _announced(usable, skin, options)
     rest = rest_of([trial.samples for trial in usable], options)
 
     def recorded(trial: Measured) -> Trial:
+        if trial.meaning.kind != kind:
+            raise InputError(
+                f"{trial.samples.where}: has {trial.meaning.kind:.80}, and most have "
+                f"{kind:.80}; see --taxels and --time-unit"
+            )
         meta: dict[str, Any] = {
             "skin": skin.raw,
             "labels": trial.labels,
@@ -114,7 +139,7 @@ def _recorded(
             meta["arm"] = arm and arm.to_dict()
         return Trial(trial.name, rest.recording(trial.samples, shape, meta))
 
-    yield from tried(alike, recorded, options.strict)
+    yield from tried(measured, recorded, options.strict)
 
 
 def _announced(
@@ -125,59 +150,14 @@ def _announced(
     """The rows and columns of the skin; prints what was taken, once for all files."""
     first = usable[0]
     taxels = len(first.meaning.taxels)
-    shape_in_file = first.meaning.shape
-    shape_in_file = shape_in_file or (skin.whole("rows", 1), skin.whole("cols", taxels))
-    shape = skin_shape(first.samples, shape_in_file, options)
-    text = first.meaning.text(first.label, shape)
-    say("; ".join([text, *first.form]))
+    in_skin = skin.whole("rows", 1), skin.whole("cols", taxels)
+    shape = skin_shape(first.samples, first.meaning.shape or in_skin, options)
+    say("; ".join([first.meaning.text(first.label, shape), *first.form]))
     if options.axes is not None:
         say(options.axes.text)
     if len({str(trial.labels) for trial in usable}) == len(usable) > FEWEST_ALONE:
-        say("each trial has a label of its own; a labels.csv beside them gives others")
+        say(f"each trial has a label of its own; {FIRST_WORDS % options.task}")
     return shape
-
-
-def _alike(
-    measured: Sequence[Measured | Refused],
-    strict: bool,
-) -> list[Measured | Refused]:
-    """The trials, without those whose columns are not those of most of them.
-
-    Raises:
-        InputError: columns without a name may be no taxels.
-    """
-    usable = [trial for trial in measured if isinstance(trial, Measured)]
-    if not usable:
-        return list(measured)
-    kinds = [str((trial.meaning.taxels, trial.meaning.unit)) for trial in usable]
-    first = usable[kinds.index(mode(kinds))]
-
-    def compared(trial: Measured) -> Measured:
-        _compare(trial, first)
-        return trial
-
-    fitting = list(tried(measured, compared, strict))
-    if first.meaning.are_all:
-        _require_taxels([trial for trial in fitting if isinstance(trial, Measured)])
-    return fitting
-
-
-def _compare(trial: Measured, first: Measured) -> None:
-    """Refuse a trial with other columns than the first."""
-    path = trial.samples.where
-    first_path = first.samples.where
-    sense = trial.meaning
-    first_sense = first.meaning
-    if sense.taxels != first_sense.taxels:
-        raise InputError(
-            f"{path}: its taxels are {short_text(sense.taxels)}, and those of "
-            f"{first_path} {short_text(first_sense.taxels)}; name them by --taxels"
-        )
-    if sense.unit != first_sense.unit:
-        raise InputError(
-            f"{path}: its time seems to be in {sense.unit}, and that of {first_path} in "
-            f"{first_sense.unit}; give --time-unit"
-        )
 
 
 def _require_taxels(measured: Sequence[Measured]) -> None:
@@ -187,13 +167,13 @@ def _require_taxels(measured: Sequence[Measured]) -> None:
     Raises:
         InputError: there is one.
     """
-    values = [trial.samples.values[..., 0] for trial in measured]
+    values = [pd.DataFrame(trial.samples.values[..., 0]) for trial in measured]
     if min(map(len, values)) < FEWEST_ROWS:
         return
-    starts = np.array([frames[0] for frames in values])
-    rises = np.all([(np.diff(frames, axis=0) > 0.0).all(0) for frames in values], 0)
-    stays = np.all([(frames == frames[0]).all(0) for frames in values], 0)
-    doubtful = rises | (stays & (starts != starts[0]).any(0))
+    trials = pd.concat(values, keys=range(len(values))).groupby(level=0)
+    steps = trials.diff().dropna()
+    tells_apart = trials.first().nunique() > 1
+    doubtful = (steps > 0.0).all() | ((steps == 0.0).all() & tells_apart)
     if doubtful.any() and not doubtful.all():
         first = measured[0]
         raise InputError(
@@ -207,9 +187,8 @@ def _understood(source: Source, options: TableOptions) -> Measured:
     axes = options.axes
     table = source.table if axes is None else parted(source.table, axes.normal)
     sense = meaning(table, options)
-    values = table.values(sense.taxels)
     t = times_of(table, sense, options)
-    samples = Samples.of(table.where, t, values, axes)
+    samples = Samples.of(table.where, t, table.values(sense.taxels), axes)
     if np.isnan(samples.values[..., 0]).all():
         raise InputError(f"{table.where}: none of its values is a finite number")
     rows = table.data.index
@@ -238,10 +217,15 @@ def _with_joints(
     if known.all() or not known.any():
         return replace(samples, joints=clock.complete(angles, where)), rows
     felt = np.isfinite(samples.values).any(axis=(1, 2))
-    order = clock.order(samples.t[known], where, str(rows.name), rows[known]).kept
-    joints_t = samples.t[known][order]
+    t = samples.t[felt]
     at_frames = clock.angles_at(
-        samples.t[felt], joints_t, angles[known][order], RELEASE_S
+        t,
+        samples.t[known],
+        angles[known],
+        RELEASE_S,
+        where,
+        str(rows.name),
+        rows[known],
     )
-    frames = Samples(where, samples.t[felt], samples.values[felt])
-    return replace(frames, joints=clock.complete(at_frames, where)), rows[felt]
+    joints = clock.complete(at_frames, where)
+    return Samples(where, t, samples.values[felt], joints), rows[felt]

@@ -3,14 +3,13 @@
 import argparse
 import re
 from dataclasses import dataclass, fields
+from itertools import permutations
 from typing import Self
 
 from edge.commands.options import within
 from train.importers.axes import LETTERS, Axes
 
 UNITS_S = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
-FASTEST_HZ = 1e6
-"""A higher frame rate must be a mistake."""
 
 
 def shape_of_skin(text: str) -> tuple[int, int]:
@@ -27,32 +26,6 @@ def shape_of_skin(text: str) -> tuple[int, int]:
     return int(shape[1]), int(shape[2])
 
 
-def axis_letters(text: str) -> str:
-    """The letters of the axes along the rows, around the columns, and of the normal.
-
-    Raises:
-        ArgumentTypeError: they are not x, y and z in some order.
-    """
-    if sorted(text.lower()) != LETTERS:
-        raise argparse.ArgumentTypeError(
-            f"must be x, y and z in some order, such as xyz, not {text[:20]!r}"
-        )
-    return text.lower()
-
-
-def flipped_letters(text: str) -> str:
-    """The letters of the axes whose sign is turned round.
-
-    Raises:
-        ArgumentTypeError: one of them is not x, y or z.
-    """
-    if not text or not set(text.lower()) <= set(LETTERS):
-        raise argparse.ArgumentTypeError(
-            f"must be some of x, y and z, such as x or xz, not {text[:20]!r}"
-        )
-    return text.lower()
-
-
 def add_value_options(parser: argparse.ArgumentParser) -> None:
     """Add options on the meaning of values."""
     add = parser.add_argument
@@ -62,13 +35,14 @@ def add_value_options(parser: argparse.ArgumentParser) -> None:
         metavar="ROWSxCOLS",
         help="of the skin (default: as the file tells it, or one row)",
     )
-    add(
+    sense = parser.add_mutually_exclusive_group().add_argument
+    sense(
         "--falls",
         action="store_true",
         help="values fall under pressure: subtract them from those at rest, which are "
         "those of the trial with the quietest start",
     )
-    add(
+    sense(
         "--signed",
         action="store_true",
         help="values rise and fall: count how far they are from those at rest",
@@ -82,14 +56,16 @@ def add_value_options(parser: argparse.ArgumentParser) -> None:
     add("--missing", type=float, metavar="VALUE", help="stands for a missing value")
     add(
         "--axes",
-        type=axis_letters,
+        type=str.lower,
+        choices=[*map("".join, permutations(LETTERS))],
         metavar="XYZ",
         help="taxels of three axes, such as s1_x, s1_y, s1_z: the letters of the axes "
         "along the rows, around the columns, and of the normal force",
     )
     add(
         "--flip",
-        type=flipped_letters,
+        type=str.lower,
+        choices="x y z xy xz yz xyz".split(),
         metavar="XYZ",
         help="letters of the axes whose sign is turned round",
     )
@@ -97,9 +73,14 @@ def add_value_options(parser: argparse.ArgumentParser) -> None:
 
 def add_table_options(parser: argparse.ArgumentParser) -> None:
     """Add options for the facts that a table lacks."""
-    rate = within(float, 1e-3, FASTEST_HZ)
     add = parser.add_argument
-    add("--rate", type=rate, metavar="HZ", help="frames a second, without a time")
+    add(
+        "--rate",
+        # A higher rate must be a mistake.
+        type=within(float, 1e-3, 1e6),
+        metavar="HZ",
+        help="frames a second, without a time",
+    )
     add(
         "--frames",
         action="store_true",

@@ -7,15 +7,13 @@ import gzip
 import io
 import lzma
 import re
-import warnings
 import zipfile
 from array import array
-from collections import Counter, defaultdict
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence, Set
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from functools import cached_property
-from itertools import islice, takewhile
+from itertools import takewhile
 from pathlib import Path
 from typing import Any
 
@@ -24,21 +22,21 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from edge.commands.output import counted
-from edge.config import short_text
 from edge.errors import InputError, about
 from edge.files import parsing, read_bytes
+from train.importers.tables import EMPTY, Table, needs, numbered, require_unique
 
-EMPTY = "holds no values; leave it out or save it again"
 LARGEST_BYTES = 1 << 29
 TEXTS = (".csv", ".tsv", ".txt", ".dat")
 UNPACKERS: dict[str, Callable[..., Any]] = {
     ".gz": gzip.open,
     ".bz2": bz2.open,
+    ".dsa": bz2.open,
     ".xz": lzma.open,
 }
 """Files that hold one packed text, by their suffix."""
 PACKED = (*UNPACKERS, ".zip")
-MARKS = {"\t": "tabs", ";": "semicolons", "|": "bars", ",": "commas"}
+MARKS = "\t;|,"
 """Separators; a text with none of them is separated by blanks."""
 ABOVE = re.compile(r"[#%]|sep=.\Z|\s*\Z", re.A)
 """How a comment, blank line or separator (of Excel) before the first row begins."""
@@ -50,77 +48,8 @@ FEWEST_THOUSANDS = 3
 LOOKED_AT = 2000
 """Rows that are looked at for such numbers."""
 LONGEST_LINE = 4 << 20
-
-
-@dataclass(frozen=True)
-class Table:
-    """The columns of a file, or those of one trial in it.
-
-    Attributes:
-        where: names the file, and the trial in it, in errors.
-        data: a column for each; columns without a header are named "1", "2" and so on.
-            Its index is called `line`, and counts the lines of a text, or `row`.
-        named: the file has a header.
-        decimal: the sign before a fraction, in cells that are text.
-        shape: of the skin, where the file tells it.
-        form: how the file was read, where that is worth saying.
-        file_names: the names of all columns of the file, in its order, where they are
-            not those of `data`.
-    """
-
-    where: str
-    data: pd.DataFrame
-    named: bool = True
-    decimal: str = "."
-    shape: tuple[int, ...] = ()
-    form: tuple[str, ...] = ()
-    file_names: tuple[str, ...] = ()
-
-    def __post_init__(self) -> None:
-        if self.data.index.name is None:
-            self.data.index = pd.RangeIndex(1, len(self.data) + 1, name="row")
-
-    @property
-    def names(self) -> list[str]:
-        """The names of the columns, as they stand."""
-        return list(self.data.columns)
-
-    @property
-    def arrays(self) -> dict[str, list[str]]:
-        """The columns of each array: names that are alike up to their last dot."""
-        arrays: dict[str, list[str]] = defaultdict(list)
-        for name in self.names:
-            arrays[name.rpartition(".")[0]].append(name)
-        return arrays
-
-    def numbers(self, names: Iterable[str]) -> NDArray[np.float64]:
-        """(rows, names) the numbers of some columns, as `numbers_of`."""
-        return np.column_stack([numbers_of(self, name) for name in names])
-
-    def values(self, taxels: Sequence[str]) -> NDArray[np.float64]:
-        """(rows, taxels) the values of some taxels."""
-        return self.numbers(taxels)
-
-
-@contextmanager
-def needs(package: str, action: str) -> Iterator[None]:
-    """Name the package to install if an import in the block fails.
-
-    Raises:
-        InputError: it fails; the sentence begins with the `action`.
-    """
-    try:
-        yield
-    except ImportError:
-        raise InputError(
-            f"{action} needs {package}; install it with `pip install {package}`"
-        ) from None
-
-
-def numbered(stem: str, count: int) -> list[str]:
-    """The names of columns without a header, or of those of an array: STEM.1, STEM.2
-    and so on."""
-    return [f"{stem}.{number}".strip(".") for number in range(1, count + 1)]
+UNNAMED = re.compile(r"Unnamed: \d+")
+"""What pandas calls a column without a name."""
 
 
 def inner(path: Path) -> Path:
@@ -141,7 +70,8 @@ class _Text:
         body: from the first row on, without comments and blank lines.
         numbers: the line in the file of each row.
         mark: the separator; empty for blanks.
-        rows: the cells of the first row, and of the second if there is one.
+        first: the cells of the first row.
+        empty: the places of the columns without a name or a value.
         comment: the last comment before the first row; empty without one.
         form: how it was encoded, if not as UTF-8.
     """
@@ -149,7 +79,8 @@ class _Text:
     body: str
     numbers: Sequence[int]
     mark: str
-    rows: list[list[str]]
+    first: list[str]
+    empty: Set[int]
     comment: str
     form: list[str]
 
@@ -180,21 +111,25 @@ class _Header:
         names: numbers from 1 where there are none.
         named: whether the text has them.
         rows: of the body that they take.
-        form: what a user should know of them.
     """
 
     names: list[str]
     named: bool
     rows: int
-    form: tuple[str, ...] = ()
 
     @property
     def unique(self) -> list[str]:
-        """The names; further columns without one are told apart by their places."""
-        names = [name or f"column {place}" for place, name in enumerate(self.names, 1)]
-        if "" in self.names:
-            names[self.names.index("")] = ""
-        return names
+        """The names; columns without one are told apart by their places."""
+        return [
+            name or f"column {place} unnamed"
+            for place, name in enumerate(self.names, 1)
+        ]
+
+    def filled(self, text: _Text) -> list[int]:
+        """The places of the columns that have a name or a value."""
+        # Without a header, a sign at the ends of the rows makes an empty column.
+        names = self.names if self.named else [*self.names[:-1], ""]
+        return [i for i, name in enumerate(names) if name or i not in text.empty]
 
 
 def read_text(path: Path) -> Table:
@@ -203,24 +138,19 @@ def read_text(path: Path) -> Table:
         form = text.form
         if text.decimal == ",":
             form.append("decimal commas")
-        if text.mark not in ("", ","):
-            form.append(f"separated by {MARKS[text.mark]}")
         header = _header(text)
         _refuse_thousands(text)
-        return Table(
-            str(path),
-            _parsed(text, header),
-            header.named,
-            decimal=text.decimal,
-            form=(*form, *header.form),
-        )
+        if not header.named:
+            form.append("no header")
+        table = _parsed(text, header)
+        return Table(str(path), table, header.named, text.decimal, form=tuple(form))
 
 
 def read_labels(path: Path) -> pd.DataFrame:
     """The columns of a text file with a header; each cell is text as it stands."""
     with _opened(path) as text:
         header = _header(text)
-        return _named(_texts(text, header, range(len(header.names))), header)
+        return _texts(text, header, header.filled(text))
 
 
 def read_frame(path: Path) -> NDArray[np.float64]:
@@ -237,11 +167,12 @@ def _opened(path: Path) -> Iterator[_Text]:
     Raises:
         InputError: it cannot be read, or the block failed; the sentence names the file.
     """
-    data = read_bytes(path, LARGEST_BYTES)
-    with parsing(str(path), "a table", "; save it as text"), about(str(path)):
-        text = _text(_unpacked(path.suffix.lower(), data))
-        del data  # the text alone is needed, and may be long
-        yield text
+    with parsing(str(path), "a table", "; save it as text"):
+        data = read_unpacked(path)
+        with about(str(path)):
+            text = _text(data)
+            del data  # the text alone is needed, and may be long
+            yield text
 
 
 def _text(data: bytes) -> _Text:
@@ -266,8 +197,19 @@ def _text(data: bytes) -> _Text:
     comments = [line for line in above if line[:1] in set("#%")]
     body = "\n".join(chosen_lines)
     numbers = _lines_of_rows(chosen_lines, numbers, mark)
-    rows = [row for _, row in islice(_rows(chosen_lines, mark), 2)]
-    return _Text(body, numbers, mark, rows, "".join(comments[-1:]), form)
+    _, first = next(_rows(chosen_lines, mark))
+    empty = _empty(chosen_lines, mark)
+    return _Text(body, numbers, mark, first, empty, "".join(comments[-1:]), form)
+
+
+def _empty(lines: list[str], mark: str) -> Set[int]:
+    """The places of the columns without a name or a value."""
+    rows = _rows(lines, mark)
+    _, heading = next(rows)
+    empty = [i for i, name in enumerate(_names(heading)) if not name]
+    while empty and (row := next(rows, None)):
+        empty = [i for i in empty if not row[1][i].strip()]
+    return set(empty)
 
 
 def _lines_of_rows(kept: list[str], numbers: Sequence[int], mark: str) -> Sequence[int]:
@@ -310,12 +252,12 @@ def _rows(lines: list[str], mark: str) -> Iterator[tuple[int, list[str]]]:
 
 def _names(cells: list[str]) -> list[str]:
     """The cells of a row as names."""
-    return [cell.strip().strip('"') for cell in cells]
+    return [UNNAMED.sub("", cell.strip().strip('"')) for cell in cells]
 
 
 def _without_names(text: _Text) -> _Header:
     """The numbers that name the columns of a text without a header."""
-    return _Header(numbered("", len(text.rows[0])), False, 0, ("no header",))
+    return _Header(numbered("", len(text.first)), False, 0)
 
 
 def _header(text: _Text) -> _Header:
@@ -326,14 +268,14 @@ def _header(text: _Text) -> _Header:
     """
     header = _stated(text)
     require_unique(header.unique)
-    if header.rows == len(text.rows):
+    if header.rows == len(text.numbers):
         raise InputError(EMPTY)
     return header
 
 
 def _stated(text: _Text) -> _Header:
     """The names as they stand; a row of numbers and empty cells has none."""
-    cells = _names(text.rows[0])
+    cells = _names(text.first)
     numbers = [_is_number(cell) for cell in cells if cell]
     above = [text.comment.lstrip("#% ")]
     _, heading = next(_rows(above, text.mark))
@@ -361,9 +303,10 @@ def _refuse_thousands(text: _Text) -> None:
     for cells in zip(*(row for _, row in _rows(lines, text.mark)), strict=False):
         column = " ".join(cells)
         fractions = re.findall(r"\S*\.\S*", column)
+        if len(fractions) < FEWEST_THOUSANDS:
+            continue
         whole = re.search(r"(?<!\S)[1-9]\d\d(?!\S)", column)
-        are_alike = all(map(THOUSANDS.fullmatch, fractions))
-        if whole and are_alike and len(fractions) >= FEWEST_THOUSANDS:
+        if whole and all(map(THOUSANDS.fullmatch, fractions)):
             raise InputError(
                 f"has numbers with a point for thousands, such as {fractions[0]} beside "
                 f"{whole[0]}; save it without them"
@@ -376,84 +319,80 @@ def _parsed(text: _Text, header: _Header) -> pd.DataFrame:
     Texts and the names of trials stand as they are: a label may be `None` or `NA`, and
     trial 007 is not trial 7. In a column of numbers such words are empty cells.
     """
-    with warnings.catch_warnings():
-        # Columns that hold texts in a part of a long table are read anew below.
-        warnings.simplefilter("ignore", pd.errors.DtypeWarning)
-        table = _cells(text, header, decimal=text.decimal)
-    dtypes = list(table.dtypes)
-    altered = []
-    for i, name in enumerate(header.names):
-        if name != "trial" and pd.api.types.is_numeric_dtype(dtypes[i]):
-            continue
-        # A word such as `NA` is no string any more, nor is a number beyond measure.
-        is_text = pd.api.types.infer_dtype(table[i]) == "string"
-        if not is_text or table[i].hasnans:
-            altered.append(i)
-    if altered:
-        table[altered] = _texts(text, header, altered)
-    return _named(table, header)
+    filled = header.filled(text)
+    table = _cells(text, header, filled, decimal=text.decimal, low_memory=False)
+    texts = [
+        i
+        for i, (name, dtype) in zip(filled, table.dtypes.items(), strict=True)
+        if name == "trial" or not pd.api.types.is_numeric_dtype(dtype)
+    ]
+    if texts:
+        as_they_stand = _texts(text, header, texts)
+        table[as_they_stand.columns] = as_they_stand
+    return table
 
 
-def _texts(text: _Text, header: _Header, columns: Sequence[int]) -> pd.DataFrame:
+def _texts(text: _Text, header: _Header, columns: list[int]) -> pd.DataFrame:
     """Columns of a text whose cells are texts, and NaN where they are empty."""
     empty = {"keep_default_na": False, "na_values": [""]}
-    return _cells(text, header, usecols=columns, dtype=str, **empty)
+    return _cells(text, header, columns, dtype=str, **empty)
 
 
-def _cells(text: _Text, header: _Header, **options: Any) -> pd.DataFrame:
-    """The columns of a text, which are named by their places; the index is the line of
-    each row."""
+def _cells(
+    text: _Text,
+    header: _Header,
+    columns: list[int],
+    **options: Any,
+) -> pd.DataFrame:
+    """Columns of a text by their names; the index is the line of each row."""
     lines = pd.Index(text.numbers[header.rows :], name="line")
-    return pd.read_csv(
+    table = pd.read_csv(
         # As bytes, for a `StringIO` takes four for each character.
         io.BytesIO(text.body.encode()),
         sep=text.mark or r"\s+",
         header=None,
         skiprows=header.rows,
-        names=range(len(header.names)),
+        names=header.unique,
+        usecols=columns,
         index_col=False,
         skipinitialspace=True,
         **options,
-    ).set_axis(lines)
+    )
+    return table.set_axis(lines)
 
 
-def _named(table: pd.DataFrame, header: _Header) -> pd.DataFrame:
-    """The columns by their names, without those that have neither a name nor a
-    value."""
-    # Without a header, a sign at the ends of the rows makes an empty column.
-    last = len(header.names) - (not header.named)
-    filled = [
-        i for i in table if (header.names[i] and i < last) or table[i].notna().any()
-    ]
-    unique = header.unique
-    return table[filled].set_axis([unique[i] for i in filled], axis=1)
+def read_unpacked(path: Path) -> bytes:
+    """The bytes of a file, unpacked where its suffix says that it is packed.
 
-
-def _unpacked(suffix: str, data: bytes) -> bytes:
-    """The bytes of a file, unpacked where its suffix says that it is packed."""
-    file: Any = io.BytesIO(data)
+    Raises:
+        InputError: it cannot be read, or is too large.
+    """
+    file: Any = io.BytesIO(read_bytes(path, LARGEST_BYTES))
+    suffix = path.suffix.lower()
     if suffix == ".zip":
         archive = zipfile.ZipFile(file)
         names = archive.namelist()
         if len(names) != 1:
-            raise InputError(f"holds {len(names)} files; unpack it into a folder")
+            raise InputError(
+                f"{path}: holds {len(names)} files; unpack it into a folder"
+            )
         file = archive.open(names[0])
     elif suffix in UNPACKERS:
         file = UNPACKERS[suffix](file)
     with file:
-        data = file.read(LARGEST_BYTES + 1)
-    if len(data) > LARGEST_BYTES:
-        raise InputError(f"holds more than {LARGEST_BYTES >> 20} MB; save it in parts")
-    return data
+        unpacked: bytes = file.read(LARGEST_BYTES + 1)
+    if len(unpacked) > LARGEST_BYTES:
+        megabytes = LARGEST_BYTES >> 20
+        raise InputError(f"{path}: holds more than {megabytes} MB; save it in parts")
+    return unpacked
 
 
 def _decoded(data: bytes) -> tuple[str, list[str]]:
     """A text, and how it was encoded if not in UTF-8."""
     if data.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
         return data.decode("utf-16"), ["UTF-16"]
-    data = data.removeprefix(codecs.BOM_UTF8)
     try:
-        return data.decode(), []
+        return data.decode("utf-8-sig"), []
     except UnicodeDecodeError:
         return data.decode("cp1252"), ["Windows-1252"]
 
@@ -475,67 +414,3 @@ def read_parquet(path: Path) -> Table:
     if not isinstance(data.index, pd.RangeIndex):
         data = data.reset_index()
     return Table(str(path), data.rename(columns=str))
-
-
-def place_of(mask: pd.Series) -> str:
-    """The first row of a table that a mask names, in words."""
-    return f"{mask.index.name} {mask.idxmax()}"
-
-
-def numbers_of(table: Table, name: str) -> pd.Series:
-    """A column as numbers; empty cells are NaN.
-
-    Raises:
-        InputError: a cell is no number.
-    """
-    column = table.data[name]
-    if table.decimal == "," and not pd.api.types.is_numeric_dtype(column):
-        column = column.str.replace(",", ".", n=1)
-    numbers = pd.to_numeric(column, errors="coerce").astype("float64")
-    infinite = np.isinf(numbers)
-    if infinite.any():
-        raise InputError(
-            f"{table.where}: column {name} has a number beyond measure in "
-            f"{place_of(infinite)}; fix or delete it"
-        )
-    require_converted(table, name, numbers, "no number")
-    return numbers
-
-
-def require_converted(table: Table, name: str, converted: pd.Series, kind: str) -> None:
-    """Refuse a column of which a filled cell could not be converted.
-
-    Raises:
-        InputError: there is one; the sentence says that it is of that kind.
-    """
-    column = table.data[name]
-    bad = converted.isna() & column.notna()
-    if bad.any():
-        cell = str(column[bad].iloc[0])
-        raise InputError(
-            f"{table.where}: {short_text(cell)} in column {name} is {kind} ({place_of(bad)})"
-        )
-
-
-def require_unique(names: Iterable[str]) -> None:
-    """Refuse a table with two columns of one name.
-
-    Raises:
-        InputError: two are named alike.
-    """
-    for name, count in Counter(names).items():
-        if count > 1:
-            raise InputError(f"two columns are named {name}; rename one of them")
-
-
-def require_filled(path: object, data: pd.DataFrame, name: str) -> None:
-    """Refuse a table with an empty cell in a column that tells its rows apart.
-
-    Raises:
-        InputError: a cell is empty; the sentence names its line.
-    """
-    empty = data[name].isna()
-    if empty.any():
-        raise InputError(
-            f"{path}: {place_of(empty)} has no {name}; enter it, or leave the row out"
-        )

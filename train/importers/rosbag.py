@@ -13,10 +13,9 @@ from edge.files import open_regular, parsing
 from edge.touch.arm import Chain
 from train.importers import Trial
 from train.importers.options import LogOptions
-from train.importers.reading import needs
-from train.importers.topics import Log, add_options
-
-__all__ = ["add_options", "trials"]
+from train.importers.tables import needs
+from train.importers.topics import Log
+from train.importers.topics import add_options as add_options
 
 
 def trials(

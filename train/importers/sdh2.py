@@ -7,7 +7,6 @@ times of their own. Source: https://github.com/peter-kiechle/tactile-sensors,
 `python/classification`.
 """
 
-import bz2
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -19,11 +18,12 @@ from numpy.typing import NDArray
 
 from edge.config import short_text
 from edge.errors import InputError
-from edge.files import open_regular, parsing
+from edge.files import parsing
 from edge.recording import Recording
 from edge.touch.arm import Chain
 from edge.touch.layout import RELEASE_S, SkinLayout
 from train.importers import Trial, clock
+from train.importers.reading import read_unpacked
 
 PADS = (1, 5)
 """The matrices that touch: the distal pads of the two fingers that close. In 3 of 856
@@ -34,8 +34,6 @@ THRESHOLD_COUNTS = 50
 ONSET_COUNTS = 60
 """A little above the threshold, so that a force that fluctuates there is one
 contact."""
-LARGEST_BYTES = 1 << 26
-"""Largest size of an unpacked file; the longest published grasp takes 1 MB."""
 
 
 def trials(path: Path, arm: Chain | None = None) -> Iterator[Trial]:
@@ -71,14 +69,8 @@ def grasp(file: Path) -> Recording:
     Raises:
         InputError: the file is damaged or no such grasp.
     """
-    with (
-        parsing(str(file), "a grasp of an SDH-2 hand", "; fetch it again"),
-        open_regular(file, LARGEST_BYTES) as raw,
-        bz2.open(raw) as packed,
-    ):
-        text = packed.read(LARGEST_BYTES + 1)
-        if len(text) > LARGEST_BYTES:
-            raise ValueError(f"it unpacks to more than {LARGEST_BYTES >> 20} MB")
+    with parsing(str(file), "a grasp of an SDH-2 hand", "; fetch it again"):
+        text = read_unpacked(file)
         if b"<!DOCTYPE" in text:  # entities could exhaust memory
             raise ValueError("it declares a document type")
         return _recording(ElementTree.fromstring(text), file)
@@ -214,9 +206,9 @@ def _joints(
     if not angles:
         return None
     joints_t = (np.array(stamps) - start_ms) / 1000.0
-    rows = clock.order(joints_t, f"{file}: its joint angles", "angle").kept
     radians = np.radians(np.array(angles))
-    return clock.angles_at(t, joints_t[rows], radians[rows], RELEASE_S)
+    where = f"{file}: its joint angles"
+    return clock.angles_at(t, joints_t, radians, RELEASE_S, where, "angle")
 
 
 def _number(

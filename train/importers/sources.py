@@ -4,7 +4,6 @@ before their columns are understood."""
 import re
 from collections.abc import Callable, Iterable, Iterator, Sequence, Set
 from dataclasses import dataclass, field, replace
-from functools import partial
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -16,28 +15,30 @@ from edge.config import short_text
 from edge.errors import InputError, about
 from edge.files import parsing
 from train.importers import Refused, arrays
-from train.importers.columns import columns, is_date, named_times
+from train.importers.columns import columns, named_times
 from train.importers.options import TableOptions
 from train.importers.reading import (
     TEXTS,
-    Table,
     inner,
-    numbered,
     read_frame,
     read_labels,
     read_parquet,
     read_text,
-    require_filled,
     suffix_of,
 )
+from train.importers.tables import Table, numbered, require_filled, require_unique
 
 LABELS = "labels.csv"
 SKIN = "skin.json"
 SUFFIXES = (*TEXTS, ".parquet", *arrays.SUFFIXES)
 NUMBERED = re.compile(r"(?:trial|rec|recording|run|take|sample|test)?[\s_.-]*\d+", re.I)
 """Names of folders that only count trials."""
-SPARSEST = 64
-"""Cells for each value of a long table; more would be nearly empty."""
+TAXEL = re.compile(
+    r"(?:taxel|sensor|channel|electrode|cell)(?:[ _]?(?:id|no|nr|number|index))?", re.I
+)
+"""Names of the column beside `value` that tells the taxel."""
+SPARSEST = 2
+"""Cells for each value of a long table whose taxels have no times in common."""
 Before = TypeVar("Before")
 After = TypeVar("After")
 
@@ -129,8 +130,8 @@ def _labelled(
             continue
         if source.name not in rows:
             yield Refused(f"{path}: has no row for {source.name}, which has no label")
-        others = {key: source.labels[key] for key in source.labels if key != task}
-        labels = others | rows.get(source.name, {})
+        labels = {**source.labels, task: "", **rows.get(source.name, {})}
+        labels = {key: label for key, label in labels.items() if label}
         yield replace(source, labels=labels, label=LABELS)
 
 
@@ -164,16 +165,11 @@ def _sources(
         places = _files(_visible(path))
     counting = _counting([place.relative_to(folder) for place in places])
     for place in places:
-        named = partial(
-            _named_by, *_label(place.relative_to(folder), counting, options.task)
-        )
-        sources = until_refused(read(place, folder, options), options.strict)
-        yield from tried(sources, named, options.strict)
-
-
-def _named_by(labels: dict[str, str], label: str, source: Source) -> Source:
-    """A trial with the labels of its names, where nothing else tells one."""
-    return source if source.label else replace(source, labels=labels, label=label)
+        labels, label = _label(place.relative_to(folder), counting, options.task)
+        for source in until_refused(read(place, folder, options), options.strict):
+            if isinstance(source, Source) and not source.label:
+                source = replace(source, labels=labels, label=label)
+            yield source
 
 
 def _visible(folder: Path) -> list[Path]:
@@ -239,11 +235,14 @@ def _of_file(
             table = arrays.table_of(str(file), stored, options)
     else:
         table = read_parquet(file) if suffix == ".parquet" else read_text(file)
-    if "trial" in table.names:
-        with parsing(str(file), "a table of trials"):
+    taxels = list(filter(TAXEL.fullmatch, table.names))
+    if "value" in table.names and len(taxels) == 1:
+        table = replace(table, data=table.data.rename(columns={taxels[0]: "taxel"}))
+    with parsing(str(file), "a table of trials"):
+        if "trial" in table.names:
             yield from _trials_in(table, options)
-    else:
-        yield Source(_name(file, folder), table)
+        else:
+            yield Source(_name(file, folder), _wide(table, options))
 
 
 def _name(file: Path, folder: Path) -> str:
@@ -284,8 +283,7 @@ def _of_frames(
     shape = frames[0].shape
     for file, frame in zip(files, frames, strict=True):
         if frame.shape != shape:
-            sizes = [" x ".join(map(str, size)) for size in (frame.shape, shape)]
-            raise InputError(f"{file}: is {sizes[0]} taxels, and {files[0]} {sizes[1]}")
+            raise InputError(f"{file}: is {frame.shape} taxels, and {files[0]} {shape}")
     values = np.reshape(frames, (len(files), -1))
     data = pd.DataFrame(values, columns=numbered("", values.shape[1]))
     if options.rate is None:
@@ -316,8 +314,7 @@ def _frame(file: Path) -> NDArray[np.float64]:
 
 def _trials_in(table: Table, options: TableOptions) -> Iterator[Source | Refused]:
     """The trials of a long table."""
-    for name in {"trial", "taxel"} & set(table.names):
-        require_filled(table.where, table.data, name)
+    require_filled(table.where, table.data, "trial")
     tasks = _tasks_in(table, options.task)
     label = f"column {', column '.join(tasks)}" if tasks else "none"
 
@@ -326,33 +323,20 @@ def _trials_in(table: Table, options: TableOptions) -> Iterator[Source | Refused
         where = f"{table.where}: trial {name}"
         labels = _labels_in(where, rows[tasks])
         data = rows.drop(columns=["trial", *tasks])
-        names = tuple(table.names)
-        part = replace(table, where=where, data=data, file_names=names)
-        if "taxel" in data:
-            part = _pivoted(part, options.time)
-        return Source(str(name), part, labels, label)
+        part = replace(table, where=where, data=data, file_names=tuple(table.names))
+        return Source(str(name), _wide(part, options), labels, label)
 
     trials = table.data.groupby("trial", sort=False)
     return tried(trials, source, options.strict)
 
 
 def _tasks_in(table: Table, task: str) -> list[str]:
-    """The columns of labels of a long table: that of the task, and those of texts, apart
-    from times that run within a trial. A number among texts is a label if it stays the
-    same within its trial."""
-    tasks = []
-    for name in table.names:
-        column = table.data[name]
-        if name in ("trial", "taxel") or pd.api.types.is_numeric_dtype(column):
-            is_task = name == task
-        else:
-            texts = column.astype(str).groupby(table.data["trial"])
-            words = pd.to_numeric(column, errors="coerce").isna().all()
-            runs = texts.nunique().max() > 1
-            is_task = not runs or (words and not is_date(table, name))
-        if is_task:
-            tasks.append(name)
-    return tasks
+    """The columns of labels of a long table: that of the task, and those of texts that
+    stay the same within a trial."""
+    texts = table.data.select_dtypes(exclude=["number", "bool"]).astype(str)
+    texts = texts.drop(columns=["trial", "taxel"], errors="ignore")
+    values = texts.groupby(table.data["trial"]).nunique().max()
+    return [name for name in table.names if name == task or values.get(name) == 1]
 
 
 def _labels_in(where: str, rows: pd.DataFrame) -> dict[str, str]:
@@ -371,18 +355,25 @@ def _labels_in(where: str, rows: pd.DataFrame) -> dict[str, str]:
     return labels
 
 
-def _pivoted(table: Table, time_terms: str | None) -> Table:
-    """A row for each time and a column for each taxel, of a table with a row for each
+def _wide(table: Table, options: TableOptions) -> Table:
+    """A row for each time and a column for each taxel, where a table has a row for each
     value."""
+    if not {"taxel", "value"} <= set(table.names):
+        return table
+    require_filled(table.where, table.data, "taxel")
     further = [name for name in table.names if name not in ("taxel", "value")]
-    time = _time_of_long(table, further, time_terms)
+    times = named_times(table) or further
+    if options.time:
+        times = columns(table, options.time)
+    if len(times) != 1:
+        raise InputError(
+            f"{table.where}: needs a time beside taxel and value, which --time names"
+        )
+    time = times[0]
     _check_long(table, time)
     wide = table.data.pivot(index=time, columns="taxel", values="value")
     wide = wide[sorted(wide.columns, key=_natural)].rename(columns=_plain)
-    if not wide.columns.is_unique or time in wide:
-        raise InputError(
-            f"{table.where} has two taxels of one name; rename one of them"
-        )
+    require_unique([time, *wide.columns])
     form = [f'ignored: "{name}"' for name in further if name != time]
     return replace(
         table,
@@ -393,22 +384,6 @@ def _pivoted(table: Table, time_terms: str | None) -> Table:
     )
 
 
-def _time_of_long(
-    table: Table,
-    further: Sequence[str],
-    terms: str | None,
-) -> str:
-    times = named_times(table) or further
-    if terms:
-        times = columns(table, terms)
-    if "value" not in table.data or len(times) != 1:
-        raise InputError(
-            f"{table.where}: needs the columns value and a time beside taxel, which "
-            "--time names"
-        )
-    return times[0]
-
-
 def _check_long(table: Table, time: str) -> None:
     """Refuse two values of a taxel at one time, and taxels without times in common."""
     data = table.data
@@ -417,10 +392,10 @@ def _check_long(table: Table, time: str) -> None:
         row = repeated.iloc[0]
         raise InputError(
             f"{table.where} has two values of taxel {_plain(row['taxel'])} at time "
-            f"{row[time]}"
+            f"{row[time]}; a column trial would tell trials apart"
         )
     cells = data[time].nunique() * data["taxel"].nunique()
-    if cells > SPARSEST * len(data):
+    if cells >= SPARSEST * len(data):
         raise InputError(
             f"{table.where}: its {len(data)} values would fill {len(data) / cells:.1%} "
             "of a table; the taxels need times in common"

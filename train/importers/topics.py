@@ -150,9 +150,9 @@ class Log:
         angles = pd.DataFrame(self._angles.get(joints_topic or "", []), columns=ANGLE)
         times = self._clock(frames, angles)
         axes = self.options.axes
-        t = frames[times].to_numpy()
         values = np.stack(frames["values"])
-        samples = Samples.of(f"{self.path}: {topic}", t, values, axes)
+        where = f"{self.path}: {topic}"
+        samples = Samples.of(where, frames[times].to_numpy(), values, axes)
         samples = samples.in_order("message")
         meta: dict[str, Any] = {
             "labels": dict(self.beside.table("labels", {}).raw),
@@ -198,29 +198,17 @@ class Log:
         """Why a log has no frames, behind a sentence."""
         for topic, reasons in self._left_out.items():
             return f": {topic} {reasons[0]}"
-        return (
-            f"; they must be {IMAGE}, {ARRAYS[2]} or another array, or a message of a "
-            "sensor's own with --field"
-        )
+        return f"; they must be {IMAGE}, an array, or a sensor's own with --field"
 
     def _stated_shape(self, shape: tuple[int, ...]) -> tuple[int, ...]:
-        """The rows and columns that frames of a shape tell, or the file beside the log.
-
-        Raises:
-            InputError: neither does, nor --shape.
-        """
+        """The rows and columns that frames of a shape tell, or else the file beside the
+        log."""
         if self.options.axes is not None:
             shape = shape[:-1]
-        if len(shape) == 2 or self.options.shape is not None:
-            return shape
         skin = self.beside.table("skin", {})
-        if skin.has("rows") and skin.has("cols"):
-            return skin.whole("rows"), skin.whole("cols")
-        raise InputError(
-            f"{self.path}: its frames do not state their rows and columns; give --shape "
-            'ROWSxCOLS, or put them as {"skin": {"rows": ..., "cols": ...}} into '
-            f"{self.path.stem}.json beside it"
-        )
+        if len(shape) != 2 and skin.has("rows"):
+            shape = (skin.whole("rows"), skin.whole("cols"))
+        return shape
 
     def _clock(self, frames: pd.DataFrame, angles: pd.DataFrame) -> str:
         """The clock of the times: that of the stamps; but that of logging, which is
@@ -252,9 +240,8 @@ class Log:
         for name in names:
             joint = angles[angles["joint"] == name]
             joint_t = joint.iloc[:, 0].to_numpy()
-            places = clock.order(joint_t, where, "message").kept
-            radians = joint[["angle"]].to_numpy()[places]
-            columns.append(clock.angles_at(t, joint_t[places], radians, release_s))
+            radians = joint[["angle"]].to_numpy()
+            columns.append(clock.angles_at(t, joint_t, radians, release_s, where))
         return clock.complete(np.hstack(columns), where)
 
     def _joint_names(self, where: str, logged: list[str | int]) -> list[str | int]:

@@ -33,11 +33,13 @@ def test_the_axis_of_time_is_that_of_the_other_arrays(stored, form):
     [
         ({"a": np.ones((6, 6)), "b": np.ones((6, 2))}, "which axis of a"),
         ({"a": np.ones((6, 4)), "b": np.ones((5, 3))}, "which axis is the time"),
-        ({"t": np.ones(7), "a": np.ones((6, 4))}, "no axis of 7 frames"),
+        ({"t": np.ones(7), "a": np.ones((6, 4))}, "is the time of 7 frames"),
         ({"a": np.ones((6, 4, 2, 2))}, "has 4 dimensions"),
         ({"": np.ones((3, 6, 2))}, "arrays are {'the array'"),
-        ({"a": np.array([1, "x"], dtype=object)}, "cells or structures; give --trials"),
-        ({"a": np.array(["x"])}, "holds no values"),
+        (
+            {"a": np.array([1, "x"], dtype=object)},
+            "holds no values.*structures, give --trials",
+        ),
         ({"a": FRAMES, "a.1": FRAMES[:, 0]}, "two columns are named a.1; rename one"),
     ],
 )

@@ -105,7 +105,6 @@ def test_the_letters_say_which_axis_is_which_and_signs_are_turned(folder, import
         ("s1 s2 s3 s4", ("--axes", "xyz"), "no columns are named by an axis"),
         ("s1_x s1_y s1_z s2", (), "or --axes xyz for taxels of three axes"),
         ("s1_x s1_y s1_z s2", ("--flip", "x"), "--flip needs --axes"),
-        ("s1_x s1_y s1_z s1", ("--axes", "xyz"), "s1 names a column and a taxel"),
     ],
 )
 def test_what_is_not_three_axes_is_one_sentence(
@@ -121,16 +120,33 @@ def test_what_is_not_three_axes_is_one_sentence(
     assert not out.exists()
 
 
-@pytest.mark.parametrize("text", ["xy", "xxyz", "abc"])
-def test_letters_that_are_no_axes_are_refused(text, tmp_path, capsys):
+@pytest.mark.parametrize(
+    ("options", "sentence"),
+    [
+        (("--axes", "xxyz"), "choose from 'xyz', 'xzy'"),
+        (("--falls", "--signed"), "not allowed with argument"),
+    ],
+)
+def test_options_that_are_at_odds_are_refused(options, sentence, tmp_path, capsys):
     with pytest.raises(SystemExit):
-        main(["import", "csv", "x", "--out", str(tmp_path / "o"), "--axes", text])
-    assert "must be x, y and z in some order" in capsys.readouterr().err
+        main(["import", "csv", "x", "--out", str(tmp_path / "o"), *options])
+    assert sentence in capsys.readouterr().err
 
 
-def test_shear_beyond_its_range_is_refused(folder, refusal):
-    large = THREE.copy()
-    large[30, 0, 0] = 40000
-    write_table(folder, named(), large)
+@pytest.mark.parametrize(("shear", "scale"), [(40000.0, "0.819175"), (0.25, "100")])
+def test_shear_beyond_its_range_or_with_fractions_is_refused(
+    folder, refusal, shear, scale
+):
+    values = THREE // 10.0
+    values[30, 0, 0] = shear
+    write_table(folder, named(), values)
     message = refusal("import", "csv", folder, "--out", folder / "out", "--axes", "xyz")
-    assert "shear reaches 40000 counts, and at most 32767" in message
+    assert f"of shear to 32767); add --scale {scale}, or" in message
+
+
+def test_taxels_of_three_axes_are_taken_beside_their_magnitudes(folder, imported):
+    magnitudes = np.abs(THREE).sum(axis=2, keepdims=True)
+    names = named("s{i}{a}", ("_x", "_y", "_z", ""))
+    write_table(folder, names, np.concatenate([THREE, magnitudes], axis=2))
+    recording = imported("--axes", "xyz")
+    assert recording.frames[:, 0].tolist() == THREE[..., 2].tolist()

@@ -34,6 +34,13 @@ def test_other_times_are_refused(times, sentence):
         order(np.array(times), "a.csv", "row")
 
 
+def test_a_log_that_is_written_on_change_alone_is_said_to_be_sparse():
+    t = np.cumsum([0.01, 0.7, 0.02, 0.9, 1.3, 0.01, 0.2, 0.01, 0.4, 0.01])
+    result = order(t, "a.bag")
+    assert len(result.kept) == len(t)
+    assert result.text.startswith("its steps are 0.01 to 1.3 s, as of a log that")
+
+
 def test_of_few_frames_at_one_time_the_later_counts():
     t = 0.01 * np.arange(200)
     t[50] = t[49]

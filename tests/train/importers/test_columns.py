@@ -7,7 +7,7 @@ import pytest
 from edge.errors import InputError
 from train.importers.columns import meaning, times_of
 from train.importers.options import TableOptions
-from train.importers.reading import Table
+from train.importers.tables import Table
 
 COUNTS = np.arange(5)
 
@@ -38,7 +38,7 @@ def test_taxels_with_a_row_and_a_column_tell_the_shape(form):
     assert sense.taxels[:3] == [form.format(0, col) for col in range(3)]
 
 
-@pytest.mark.parametrize("name", ["label", "frame", ""])
+@pytest.mark.parametrize("name", ["label", "frame"])
 def test_any_further_column_is_left_out_and_named(name):
     sense = sense_of(table("p1", "p2", name), rate=10)
     assert sense.taxels == ["p1", "p2"]
@@ -49,6 +49,7 @@ def test_any_further_column_is_left_out_and_named(name):
     ("names", "sentence"),
     [
         (("thumb", "index"), "no columns are named as taxels"),
+        (("p1", "p2", "p4", "f"), "s1 to s16 without a gap; give --taxels p1,p2,p4, "),
         (("p1", "p2", "f1", "f2"), 'are the taxels "p1" to "p2" or "f1" to "f2"'),
         (("taxel_1", "taxel_2", "tactile1", "tactile2"), 'are the taxels "taxel_1"'),
     ],
@@ -87,7 +88,7 @@ def test_columns_are_named_by_names_ranges_and_places(terms, names):
         ({"taxels": "s3"}, r"a.csv: has no column s3; it has \['s1', 's2'\]"),
         ({"taxels": "s1,s1"}, "named twice"),
         ({"taxels": "s1-s2", "joints": "s2"}, "both as a taxel and as time or joint"),
-        ({"joints": "s1,s2"}, "no column is left for taxels"),
+        ({"joints": "s1,s2"}, "no columns are named as taxels"),
         ({"time": "s1,s2"}, "--time names several columns"),
     ],
 )
@@ -126,8 +127,9 @@ def test_times_since_1970_tell_their_unit(start, unit):
     assert sense_of(table("s1", t=start + COUNTS * 1e6)).unit == unit
 
 
-def test_iso_dates_are_times_whatever_their_column_is_called():
-    dates = [f"2024-03-01T10:00:00.{i}00" for i in range(5)]
+@pytest.mark.parametrize("start", ["2024-03-01T10:", "01.03.2024 9:", "12:", ""])
+def test_times_of_the_day_are_times_whatever_their_column_is_called(start):
+    dates = [f"{start}00:00.{i}00" for i in range(5)]
     source = table("s1", zeit=dates)
     sense = sense_of(source)
     assert sense.unit == "iso"
@@ -145,14 +147,16 @@ def test_steps_that_may_be_in_either_of_two_units_are_asked_for(step, units):
 
 def test_what_is_no_date_is_named():
     source = table("s1", t=["2024-03-01T10:00", "noon", None, None, None])
-    with pytest.raises(InputError, match=r"'noon' in column t is no ISO date \(row 2"):
+    with pytest.raises(
+        InputError, match=r"'noon' in column t is no time of the day \(row 2"
+    ):
         times_of(source, sense_of(source, time_unit="iso"), TableOptions())
 
 
 def test_a_line_says_what_was_taken():
-    source = table("t", *(f"p{i}" for i in range(1, 17)), "label", "")
+    source = table("t", *(f"p{i}" for i in range(1, 17)), "label", "column 3")
     sense = sense_of(source, time_unit="ms")
     assert sense.text("folder", (4, 4)) == (
         'time: "t" in ms (as said), taxels: "p1" to "p16" (16, as 4 x 4), label: folder; '
-        'ignored: "label", a column without a name'
+        'ignored: "label", "column 3"'
     )

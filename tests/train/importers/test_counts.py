@@ -121,32 +121,42 @@ def test_values_that_are_all_missing_at_rest_have_no_scale():
 
 
 @pytest.mark.parametrize(
-    ("values", "hint"),
+    ("values", "options"),
     [
-        ([-1.0], "see --missing, --signed, --falls"),
-        ([0.5], "see --falls"),
-        ([7e4], "see --falls"),
+        ([-1.0, 5.0], "--missing -1"),
+        ([-1.5, 2.0], "--signed"),
+        ([0.5], "--scale 10"),
+        ([7e4], "--scale 0.936214"),
+        ([0.25, 1.0, -999.0, 4095.0], "--missing 4095 --missing -999 --scale 100"),
     ],
 )
-def test_what_is_no_count_is_refused(values, hint):
-    with pytest.raises(InputError, match=rf"a.csv: .* are no counts .*; {hint}"):
-        recorded(Rest(), trial(values))
+def test_the_options_that_values_lack_are_named_at_once(values, options):
+    with pytest.raises(InputError, match=rf"a.csv: .*; add {options}, or see --falls"):
+        rest_of([trial(values)], ValueOptions())
+
+
+def test_a_trial_that_is_unlike_most_is_refused_by_itself():
+    odd = trial([-1, 900])
+    rest = rest_of([odd, trial([0, 5]), trial([7, 9])], ValueOptions())
+    with pytest.raises(InputError, match="add --missing -1, or see"):
+        recorded(rest, odd)
+
+
+def test_values_that_fall_keep_their_fractions():
+    touch = trial([0.5], [0.5], [0.5], [0.25])
+    rest = rest_of([touch], ValueOptions(falls=True))
+    assert recorded(rest, touch).frames.ravel().tolist() == [0, 0, 0, 25]
 
 
 def test_a_number_that_stands_for_missing_values_is_named_and_may_be_told(capsys):
     touch = trial([0, 65535], [900, 5], [-1, 7])
-    rest_of([touch, trial([65534, 3])], ValueOptions())
+    rest_of([touch, trial([65534, 3]), trial([4, 3])], ValueOptions())
     assert "1 value of -1 stand alone; if they are missing" in capsys.readouterr().out
     touch = trial([0, 65535], [900, 5])
     rest_of([touch], ValueOptions())
     assert "1 value of 65535 stand alone" in capsys.readouterr().out
     rest_of([touch], ValueOptions(missing=65535.0))
-    assert touch.missing.tolist() == [[False, True], [False, False]]
-
-
-def test_values_cannot_fall_and_be_signed():
-    with pytest.raises(InputError, match="exclude each other"):
-        rest_of([trial([1])], ValueOptions(falls=True, signed=True))
+    assert np.isnan(touch.values[..., 0]).tolist() == [[False, True], [False, False]]
 
 
 def test_a_shape_is_rows_and_columns():

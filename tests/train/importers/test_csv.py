@@ -13,6 +13,7 @@ from scipy.io import savemat
 
 from edge.recording import load
 from train.__main__ import main
+from train.importers.csv import PANDAS
 
 T = np.array([0.0, 0.02, 0.05, 0.06])
 FRAMES = np.arange(24).reshape(4, 2, 3)
@@ -111,6 +112,31 @@ def test_the_same_trial_comes_out_of_every_form(form, folder):
     assert trial.labels == {"object": "cup"}
 
 
+def test_a_file_of_values_by_their_sensors_is_a_trial(folder):
+    rows = [(t, i, 10 * t + i) for t in (0, 10) for i in (1, 0)]
+    put(folder, {"cup_1.csv": text(rows, head="timestamp_ms,sensor_id,value")})
+    _, recordings = imported(folder)
+    assert recordings["cup_1"].frames.tolist() == [[[0, 1]], [[100, 101]]]
+
+
+def test_a_set_that_lacks_a_scale_is_refused_and_nothing_is_written(folder, refusal):
+    files = {f"{i}.txt": f"0 0\n0.{i} 0\n" for i in range(5)}
+    put(folder, files)
+    out = folder.parent / "out"
+    message = refusal("import", "csv", folder, "--out", out, *RATE)
+    assert "1.txt: 0 to 0.1 are no counts" in message
+    assert "add --scale 10, or see" in message
+    assert not list(out.glob("*"))
+
+
+def test_the_lines_of_pandas_make_a_recording(folder, refusal, monkeypatch):
+    put(folder, {"cup_1.csv": "t,thumb,index\n0,1,2\n0.1,3,4\n"})
+    refusal("import", "csv", folder, "--out", folder.parent / "out")
+    monkeypatch.chdir(folder)
+    exec(PANDAS.partition("\n")[2].replace('"s1", "s2"', '"thumb", "index"'))
+    assert load("cup_1.npz").frames.tolist() == [[[1, 2]], [[3, 4]]]
+
+
 def test_the_first_frame_of_a_folder_is_the_earliest(folder):
     write_frames(folder / "cup", [10.0, 9.0], FRAMES[:2], "{1:g}")
     _, recordings = imported(folder, "--frames")
@@ -206,12 +232,12 @@ RATE = ("--rate", "1")
         (
             {"1.txt": "1 2\n"},
             (*RATE, "--shape", "2x2"),
-            "2 values a frame are not 2 x 2 taxels; give --shape",
+            "2 values a frame are no 2 x 2 taxels; give --shape",
         ),
         (
             {"1.txt": "1 2\n", "2.txt": "1 2 3\n"},
             (*RATE, "--strict"),
-            "2.txt: its taxels are ['1', '2', '3'], and those of ",
+            "2.txt: has time in s and 3 taxels ['1', '2', '3'], and most have time in s",
         ),
         (
             {"all.csv": "trial,t,p1\na,0,1\na,1,2\n"},
@@ -220,11 +246,6 @@ RATE = ("--rate", "1")
         ),
         ({}, (), "in: holds no file .csv"),
         (
-            {"a.csv": "1 2\n"},
-            ("--frames",),
-            "in: holds no folder of frames; give a folder of",
-        ),
-        (
             {"a/0.csv": "1 2\n", "a/b.csv": "1 2\n"},
             ("--frames",),
             "a: not a folder of files that ",
@@ -232,9 +253,8 @@ RATE = ("--rate", "1")
         (
             {"a/0.csv": "1 2\n", "a/1.csv": "1\n2\n"},
             ("--frames",),
-            "1.csv: is 2 x 1 taxels, and ",
+            "1.csv: is (2, 1) taxels, and ",
         ),
-        ({"a/0.csv": "1 0.5\n"}, ("--frames",), "a: 0.5 to 1 are no counts"),
         (
             {"a/0.npy": stored(np.array(["x"]))},
             ("--frames",),
@@ -339,8 +359,8 @@ def test_numbers_of_columns_count_in_the_file_as_it_stands(folder):
 
 
 def test_a_number_among_words_is_a_label_where_it_stays_the_same(folder):
-    rows = [(trial, trial, t, t) for trial in ("7", "cup") for t in (0, 10)]
-    put(folder, {"all.csv": text(rows, head="trial,kind,t,p1")})
+    rows = [(trial, trial, f"at {t}", t, t) for trial in ("7", "cup") for t in (0, 10)]
+    put(folder, {"all.csv": text(rows, head="trial,kind,phase,t,p1")})
     _, recordings = imported(folder)
     assert recordings["7"].labels == {"kind": "7"}
     assert recordings["cup"].labels == {"kind": "cup"}
@@ -391,15 +411,15 @@ def test_dates_that_run_within_a_trial_are_its_times(folder):
     [
         (
             text([("a", 0, 1, 5), ("a", 0, 1, 6)], head="trial,t,taxel,value"),
-            "two values of taxel 1 at time 0",
+            "two values of taxel 1 at time 0; a column trial would tell",
         ),
         (
-            text([("a", i, i, 1) for i in range(300)], head="trial,t,taxel,value"),
+            text([("a", i, i, 1) for i in range(2)], head="trial,t,taxel,value"),
             "the taxels need times in common",
         ),
         (
             text([("a", 1, 2, 1, 1)], head="trial,frame,step,taxel,value"),
-            "needs the columns value and a time beside taxel, which --time names",
+            "needs a time beside taxel and value, which --time names",
         ),
         (
             text([("a", "box", 0, 1), ("a", "cup", 1, 1)], head="trial,object,t,p1"),
@@ -411,7 +431,7 @@ def test_dates_that_run_within_a_trial_are_its_times(folder):
         ),
         (
             text([("a", 0, 1, 5), ("a", 1, "", 6)], head="trial,t,taxel,value"),
-            "all.csv: line 3 has no taxel; enter it, or leave the row out",
+            "all.csv: trial a: line 3 has no taxel; enter it, or leave the row out",
         ),
     ],
 )

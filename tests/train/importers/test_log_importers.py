@@ -285,7 +285,7 @@ TWO = (skin(topic="/left"), skin(topic="/right"))
             [sensor()],
             {},
             ("--field", "taxels.z"),
-            "do not state their rows and columns; give --shape",
+            "24 values a frame are no known rows of taxels; give --shape",
         ),
     ],
 )

@@ -1,5 +1,8 @@
 """The files of a folder: which are trials, their names, and their labels."""
 
+import re
+import subprocess
+
 import pytest
 
 from tests.train.importers.test_csv import RATE, imported, put
@@ -11,7 +14,12 @@ TRIAL = "t,p1\n0,1\n0.1,2\n"
 def test_labels_that_tell_all_trials_apart_are_said(folder, capsys):
     put(folder, {f"acrylic_{n}_hold.csv": "t,s1,s2\n0,1,2\n1,3,4\n" for n in range(4)})
     imported(folder, "--time-unit", "s")
-    assert "each trial has a label of its own" in capsys.readouterr().out
+    output = capsys.readouterr().out
+    assert "each trial has a label of its own" in output
+    line = re.search(r"\(echo.*", output)[0]
+    subprocess.run(["bash", "-c", line], cwd=folder, check=True)
+    _, recordings = imported(folder, "--time-unit", "s")
+    assert recordings["acrylic_3_hold"].labels == {"object": "acrylic"}
 
 
 @pytest.mark.parametrize(
@@ -60,7 +68,10 @@ def test_the_columns_are_those_of_most_files(folder, capsys):
     status, recordings = imported(folder)
     assert status == 1
     assert list(recordings) == ["cup_0", "cup_1", "cup_2"]
-    assert "a_1.csv: its taxels are ['u1'], and those of" in capsys.readouterr().err
+    assert (
+        "a_1.csv: has time in s and 1 taxels ['u1'], and most have time in s"
+        in capsys.readouterr().err
+    )
 
 
 def test_of_two_trials_of_one_name_the_first_is_imported(folder, capsys):

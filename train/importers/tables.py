@@ -1,0 +1,149 @@
+"""Tables whose columns are not yet understood: their cells as numbers, and what no
+table may lack."""
+
+from collections import Counter, defaultdict
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from edge.config import short_text
+from edge.errors import InputError
+
+EMPTY = "holds no values; leave it out or save it again"
+
+
+@dataclass(frozen=True)
+class Table:
+    """The columns of a file, or those of one trial in it.
+
+    Attributes:
+        where: names the file, and the trial in it, in errors.
+        data: a column for each; columns without a header are named "1", "2" and so on.
+            Its index is called `line`, and counts the lines of a text, or `row`.
+        named: the file has a header.
+        decimal: the sign before a fraction, in cells that are text.
+        shape: of the skin, where the file tells it.
+        form: how the file was read, where that is worth saying.
+        file_names: the names of all columns of the file, in its order, where they are
+            not those of `data`.
+    """
+
+    where: str
+    data: pd.DataFrame
+    named: bool = True
+    decimal: str = "."
+    shape: tuple[int, ...] = ()
+    form: tuple[str, ...] = ()
+    file_names: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        if self.data.index.name is None:
+            self.data.index = pd.RangeIndex(1, len(self.data) + 1, name="row")
+
+    @property
+    def names(self) -> list[str]:
+        """The names of the columns, as they stand."""
+        return list(self.data.columns)
+
+    @property
+    def candidates(self) -> list[str]:
+        """The names of the columns that may be taxels."""
+        return self.names
+
+    @property
+    def arrays(self) -> dict[str, list[str]]:
+        """The columns of each array: names that are alike up to their last dot."""
+        arrays: dict[str, list[str]] = defaultdict(list)
+        for name in self.names:
+            arrays[name.rpartition(".")[0]].append(name)
+        return arrays
+
+    def numbers(self, names: Sequence[str]) -> NDArray[np.float64]:
+        """(rows, names) the numbers of some columns, as `numbers_of`."""
+        return np.column_stack([numbers_of(self, name) for name in names])
+
+    values = numbers
+
+
+@contextmanager
+def needs(package: str, action: str) -> Iterator[None]:
+    """Name the package to install if an import in the block fails.
+
+    Raises:
+        InputError: it fails; the sentence begins with the `action`.
+    """
+    try:
+        yield
+    except ImportError:
+        raise InputError(
+            f"{action} needs {package}; install it with `pip install {package}`"
+        ) from None
+
+
+def numbered(stem: str, count: int) -> list[str]:
+    """The names of columns without a header, or of those of an array: STEM.1, STEM.2
+    and so on."""
+    return [f"{stem}.{number}".strip(".") for number in range(1, count + 1)]
+
+
+def place_of(mask: pd.Series) -> str:
+    """The first row of a table that a mask names, in words."""
+    return f"{mask.index.name} {mask.idxmax()}"
+
+
+def numbers_of(table: Table, name: str) -> pd.Series:
+    """A column as numbers; empty cells are NaN.
+
+    Raises:
+        InputError: a cell is no number, or one beyond measure.
+    """
+    column = table.data[name]
+    if table.decimal == "," and not pd.api.types.is_numeric_dtype(column):
+        column = column.str.replace(",", ".", n=1)
+    numbers = pd.to_numeric(column, errors="coerce").astype("float64")
+    numbers = numbers.where(np.isfinite(numbers))
+    require_converted(table, name, numbers, "no number")
+    return numbers
+
+
+def require_converted(table: Table, name: str, converted: pd.Series, kind: str) -> None:
+    """Refuse a column of which a filled cell could not be converted.
+
+    Raises:
+        InputError: there is one; the sentence says that it is of that kind.
+    """
+    column = table.data[name]
+    bad = converted.isna() & column.notna()
+    if bad.any():
+        cell = str(column[bad].iloc[0])
+        raise InputError(
+            f"{table.where}: {short_text(cell)} in column {name} is {kind} ({place_of(bad)})"
+        )
+
+
+def require_unique(names: Iterable[str]) -> None:
+    """Refuse a table with two columns of one name.
+
+    Raises:
+        InputError: two are named alike.
+    """
+    for name, count in Counter(names).items():
+        if count > 1:
+            raise InputError(f"two columns are named {name}; rename one of them")
+
+
+def require_filled(path: object, data: pd.DataFrame, name: str) -> None:
+    """Refuse a table with an empty cell in a column that tells its rows apart.
+
+    Raises:
+        InputError: a cell is empty; the sentence names its line.
+    """
+    empty = data[name].isna()
+    if empty.any():
+        raise InputError(
+            f"{path}: {place_of(empty)} has no {name}; enter it, or leave the row out"
+        )
