@@ -39,9 +39,7 @@ def policies(model: Model, error: float) -> Mapping[str, Policy]:
         if rule is None:
             policy_of[task] = Uncertified(model.info)
         else:
-            # At a fixed window a product needs no answers of its factors.
-            waits = task in model.info.products and not is_fixed(rule)
-            kind = Product if waits else Early
+            kind = Product if task in model.info.products else Early
             policy_of[task] = kind(model.info, task, rule, error)
     return policy_of
 
@@ -67,6 +65,7 @@ class Uncertified:
     """Decide at the end of the window, as without an error rate, and say so."""
 
     def __init__(self, info: ModelInfo) -> None:
+        self._info = info
         self._full = len(info.decision_points_s) - 1
 
     def answer(
@@ -78,6 +77,8 @@ class Uncertified:
         """The model's answer at the last decision point."""
         if point < self._full:
             return None
+        if candidate.task in self._info.products:
+            candidate = paired(self._info, candidate, decided)
         return candidate.flagged(uncertified=True)
 
 
@@ -149,8 +150,7 @@ class Early:
 
 
 class Product(Early):
-    """Decide when both factors are, by their labels. A pair that was never met has no
-    name."""
+    """Decide when both factors are, by their labels."""
 
     def answer(
         self,
@@ -162,28 +162,29 @@ class Product(Early):
         factors = self._task.factors
         if not decided.keys() >= factors.keys():
             return None
-        indices = {}
-        confidence = 1.0
-        sure = True
-        for factor in factors:
-            answer = decided[factor]
-            labels = self._info.tasks[factor].labels
-            indices[factor] = labels.index(str(answer.label))
-            confidence *= answer.confidence or 0.0
-            sure = sure and answer.stopped_by == "confidence"
-        index = product_label(factors, indices)
-        if index is None or candidate.label is None:
-            return self._answered(withheld(candidate), sure)
-        label = self._task.labels[index]
-        decision = _decision(candidate)._replace(label=label)
-        confidence = round(confidence, 6)
-        candidate = replace(
-            candidate,
-            label=label,
-            confidence=confidence,
-            decision=decision,
-        )
-        return self._answered(candidate, sure)
+        sure = all(decided[factor].stopped_by == "confidence" for factor in factors)
+        return self._answered(paired(self._info, candidate, decided), sure)
+
+
+def paired(
+    info: ModelInfo, candidate: Decided, decided: Mapping[str, Decided]
+) -> Decided:
+    """The answer to a product by its factors' labels. A pair that was never met has no
+    name."""
+    task = info.tasks[candidate.task]
+    indices = {}
+    confidence = 1.0
+    for factor in task.factors:
+        answer = decided[factor]
+        indices[factor] = info.tasks[factor].labels.index(str(answer.label))
+        confidence *= answer.confidence or 0.0
+    index = product_label(task.factors, indices)
+    if index is None or candidate.label is None:
+        return withheld(candidate)
+    label = task.labels[index]
+    decision = _decision(candidate)._replace(label=label)
+    confidence = round(confidence, 6)
+    return replace(candidate, label=label, confidence=confidence, decision=decision)
 
 
 Policy = Uncertified | Early
