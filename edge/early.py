@@ -66,7 +66,6 @@ class Uncertified:
 
     def __init__(self, info: ModelInfo) -> None:
         self._info = info
-        self._full = len(info.decision_points_s) - 1
 
     def answer(
         self,
@@ -75,7 +74,7 @@ class Uncertified:
         decided: Mapping[str, Decided],
     ) -> Decided | None:
         """The model's answer at the last decision point."""
-        if point < self._full:
+        if point < len(self._info.decision_points_s) - 1:
             return None
         if candidate.task in self._info.products:
             candidate = paired(self._info, candidate, decided)
@@ -131,10 +130,9 @@ class Early:
     def _is_sure(self, candidate: Decided, point: int) -> bool:
         decision = _decision(candidate)
         novelty = self._info.novelty
-        if decision.label_distances is None or novelty is None:
-            raise InputError(
-                f"the model gives no distances of {candidate.task}'s labels"
-            )
+        # A model with decision points has both.
+        assert novelty is not None
+        assert decision.label_distances is not None
         label = self._task.labels.index(decision.label)
         excess = novelty.excess(point, decision.novelty)
         distances = decision.label_distances.tolist()
@@ -142,11 +140,11 @@ class Early:
 
     def _answered(self, candidate: Decided, sure: bool) -> Decided:
         """The answer of the rule."""
-        if candidate.label is not None and not sure and not is_fixed(self._rule):
-            candidate = candidate.flagged(unsure=True)
+        unsure = not (sure or candidate.label is None or is_fixed(self._rule))
         stopped_by = "confidence" if sure else "window"
         answer = replace(candidate, error=self._error, stopped_by=stopped_by)
-        return answer.flagged(tie=False)  # the rule does not go by votes
+        # The rule does not go by votes.
+        return answer.flagged(unsure=unsure, tie=False)
 
 
 class Product(Early):
@@ -173,17 +171,17 @@ def paired(
     name."""
     task = info.tasks[candidate.task]
     indices = {}
-    confidence = 1.0
+    likely = 1.0
     for factor in task.factors:
         answer = decided[factor]
         indices[factor] = info.tasks[factor].labels.index(str(answer.label))
-        confidence *= answer.confidence or 0.0
+        likely *= answer.confidence or 0.0
     index = product_label(task.factors, indices)
     if index is None or candidate.label is None:
         return withheld(candidate)
     label = task.labels[index]
     decision = _decision(candidate)._replace(label=label)
-    confidence = round(confidence, 6)
+    confidence = round(likely, 6)
     return replace(candidate, label=label, confidence=confidence, decision=decision)
 
 

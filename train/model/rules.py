@@ -166,24 +166,25 @@ def agreeing(
         seconds: (points,) windows.
     """
     least = rules[product][0].error
-    agreed: dict[str, list[StoppingRule]] = {product: []}
+    agreed = {}
     for factor in factors:
         agreed[factor] = [rule for rule in rules[factor] if rule.error < least]
+    of_product: list[StoppingRule] = []
     for rule in rules[product]:
-        followed = _followed(rule, {f: agreed[f] for f in factors}, courses, seconds)
+        followed = _followed(rule, agreed, courses, seconds)
         if len(followed) == len(factors):
-            followed[product] = rule
-        elif agreed[product]:
+            of_product.append(rule)
+        elif of_product:
             # Factors that go on by themselves would make the product err more often.
             continue
-        for task, of_task in followed.items():
-            agreed[task].append(of_task)
-    if not agreed[product]:
-        at, wrong = courses[product].under(*(agreed[factor][-1] for factor in factors))
+        for factor, of_factor in followed.items():
+            agreed[factor].append(of_factor)
+    if not of_product:
+        at, wrong = courses[product].under(*(of[-1] for of in agreed.values()))
         limit = upper_limit(int(wrong.sum()), len(wrong), TEST_SHARE * RISK / 2.0)
         mean_s = float(seconds[at].mean())
-        agreed[product] = [StoppingRule(limit, mean_s, NEVER, len(seconds) - 1)]
-    return agreed
+        of_product = [StoppingRule(limit, mean_s, NEVER, len(seconds) - 1)]
+    return {product: of_product, **agreed}
 
 
 def _followed(
