@@ -107,7 +107,7 @@ def with_early_settings(early, tmp_path_factory):
         "t": Choice("IV", 6, 3, features=area),
         "u": Choice("IV", 2, 3, features=area),
     }
-    settings = Early(1.2, at_first, [at_first] * 10)
+    settings = Early(at_first, [at_first] * 10)
     path = tmp_path_factory.mktemp("early") / "model.onnx"
     return X, *fitted_model(path, early.info, choices, X, LABELS, settings)
 
