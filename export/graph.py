@@ -28,7 +28,6 @@ from train.model.novelty import (
     CLIP,
     FARTHEST,
     STEP_BITS,
-    UNIT,
     NoveltyPoint,
     NoveltySpace,
 )
@@ -264,8 +263,7 @@ def _doubt(
     )
     squares = _apart(build, "novelty", y, y, columns, [p.rows for p in points])
     nearest = _nearest(build, squares, [p.nearness for p in points])
-    product = build.node("Mul", build.node("Sqrt", outside), nearest)
-    score = build.node("Mul", product, UNIT)
+    score = build.node("Mul", build.node("Sqrt", outside), nearest)
     build.node("Squeeze", score, [1], output=names["novelty"])
     _remoteness(build, y, columns, points, names["remoteness"])
 
@@ -309,8 +307,7 @@ def _apart(
 def _nearest(build: Builder, squares: str, nearness: Sequence[Floats]) -> str:
     """Name of the root (n, 1) of the smallest of squares (n, rows) times the nearness
     (rows,) at each decision point."""
-    factors = build.by_decision_point_small(nearness)
-    squares = build.node("Mul", squares, factors)
+    squares = build.node("Mul", squares, build.by_decision_point_small(nearness))
     nearest, _ = build.nodes("TopK", [squares, [1]], ["", ""], largest=0)
     return build.node("Sqrt", nearest)
 

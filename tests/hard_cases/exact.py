@@ -138,8 +138,7 @@ def doubt(space, point, vectors):
     for outside, place in zip(squares.tolist(), places, strict=True):
         apart = rows - place
         closest = least_root(apart, at.nearness)
-        product = float(Fraction(root(max(outside, 1))) * Fraction(closest))
-        novelty.append(product * 2.0**-STEP_BITS)
+        novelty.append(float(Fraction(root(max(outside, 1))) * Fraction(closest)))
         # With weights in quarters, the root is four times as long.
         remoteness.append(least_root(apart * quarters, at.weighted_nearness) / 4.0)
     return {"novelty": np.array(novelty), "remoteness": np.array(remoteness)}

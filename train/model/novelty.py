@@ -57,8 +57,6 @@ CLIP = 6.0
 """Standard deviations at which a column is cut off."""
 STEP_BITS = 12
 """A standard deviation has 2^`STEP_BITS` steps."""
-UNIT = 2.0**-STEP_BITS
-"""Of the novelty: a standard deviation outside the components."""
 SHRINKAGE = 0.03
 """Share of the mean variance in the covariance within labels."""
 STORED_BITS = 15
@@ -161,7 +159,7 @@ class NoveltySpace:
         nearest = _nearest(y, point.rows, point.nearness)
         rows = point.rows * point.weights
         remoteness = _nearest(y * point.weights, rows, point.weighted_nearness)
-        return np.sqrt(outside) * nearest * UNIT, remoteness
+        return np.sqrt(outside) * nearest, remoteness
 
 
 def _nearest(y: Floats, rows: Floats, nearness: Floats) -> Floats:
@@ -233,10 +231,9 @@ def _coordinates(z: Floats, whitening: Floats, shift: int) -> Floats:
 
 def _point(mean: Floats, gain: Floats, z: Floats, labels: Strings) -> NoveltyPoint:
     """The constants of a decision point at which trials have the components z."""
-    within = z.copy()
-    for label in np.unique(labels):
-        of_label = labels == label
-        within[of_label] -= z[of_label].mean(axis=0)
+    names, classes = np.unique(labels, return_inverse=True)
+    means = np.stack([z[classes == i].mean(axis=0) for i in range(len(names))])
+    within = z - means[classes]
     components = z.shape[1]
     covariance = within.T @ within / len(z)
     variance = max(float(np.trace(covariance)) / components, 1.0)
@@ -244,7 +241,8 @@ def _point(mean: Floats, gain: Floats, z: Floats, labels: Strings) -> NoveltyPoi
     covariance += SHRINKAGE * variance * np.eye(components)
     values, axes = np.linalg.eigh(covariance)
     whitening = axes / np.sqrt(values)
-    whitening, directions = _turned(whitening, z, labels)
+    between = (means - z.mean(axis=0)) * np.sqrt(np.bincount(classes))[:, None]
+    whitening, directions = _turned(whitening, between)
     weights = np.where(np.arange(components) < directions, 1.0, BESIDE)
     fine = _shift(whitening, WHITENING_BITS)
     integers = np.rint(np.ldexp(whitening, fine))
@@ -255,16 +253,11 @@ def _point(mean: Floats, gain: Floats, z: Floats, labels: Strings) -> NoveltyPoi
     return NoveltyPoint(mean, gain, integers, shift, rows, weights, nearness, weighted)
 
 
-def _turned(whitening: Floats, z: Floats, labels: Strings) -> tuple[Floats, int]:
+def _turned(whitening: Floats, between: Floats) -> tuple[Floats, int]:
     """A whitening turned so that the discriminants of the labels come first, and how
-    many they are."""
-    whitened = z @ whitening
-    names, classes = np.unique(labels, return_inverse=True)
-    sizes = np.bincount(classes)
-    means = np.stack([whitened[classes == i].mean(axis=0) for i in range(len(names))])
-    between = (means - whitened.mean(axis=0)) * np.sqrt(sizes)[:, None]
-    axes = np.linalg.svd(between)[2]
-    return whitening @ axes.T, min(len(names) - 1, len(axes))
+    many they are, from the labels' weighted deviations (labels, components)."""
+    axes = np.linalg.svd(between @ whitening)[2]
+    return whitening @ axes.T, min(len(between) - 1, len(axes))
 
 
 def _nearness(rows: Floats, labels: Strings) -> Floats:

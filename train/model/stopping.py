@@ -184,10 +184,9 @@ class SequentialClassifier:
         self.stopping_ = self._with_curves(
             self._certified(chosen_without), chosen_by_all, unseen
         )
-        of_name = self.stopping_[self._name]
         self.remoteness_ = replace(self._bare, worth=self._worth(never_met))
-        named = replace(of_name, remoteness=self.remoteness_)
-        self.stopping_ = {**self.stopping_, self._name: named}
+        named = replace(self.stopping_[self._name], remoteness=self.remoteness_)
+        self.stopping_[self._name] = named
         return self
 
     @property
