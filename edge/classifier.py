@@ -94,9 +94,9 @@ class Classifier:
     which no rule is certified is decided at the full window, flagged `uncertified`. A
     task that is the product of two others, as category is of softness and mobility,
     never contradicts them: it is decided when both are, by their labels, and they
-    follow its rule where it has one; where they have faster ones, it waits for a fixed
-    window. An unusual contact waits for the full window. `unsure` flags that the window
-    ended before the confidence was reached.
+    follow its rule where it has one that is as fast as theirs. An unusual contact waits
+    for the full window. `unsure` flags that the window ended before the confidence was
+    reached.
 
     A decision has flags, the reasons to doubt it: see `edge.flags`.
 

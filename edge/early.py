@@ -39,9 +39,7 @@ def policies(model: Model, error: float) -> Mapping[str, Policy]:
         if rule is None:
             policy_of[task] = Uncertified(model.info)
         else:
-            # At a fixed window a product needs no answers of its factors.
-            waits = task in model.info.products and not is_fixed(rule)
-            kind = Product if waits else Early
+            kind = Product if task in model.info.products else Early
             policy_of[task] = kind(model.info, task, rule, error)
     return policy_of
 
@@ -67,7 +65,7 @@ class Uncertified:
     """Decide at the end of the window, as without an error rate, and say so."""
 
     def __init__(self, info: ModelInfo) -> None:
-        self._full = len(info.decision_points_s) - 1
+        self._info = info
 
     def answer(
         self,
@@ -76,8 +74,10 @@ class Uncertified:
         decided: Mapping[str, Decided],
     ) -> Decided | None:
         """The model's answer at the last decision point."""
-        if point < self._full:
+        if point < len(self._info.decision_points_s) - 1:
             return None
+        if candidate.task in self._info.products:
+            candidate = paired(self._info, candidate, decided)
         return candidate.flagged(uncertified=True)
 
 
@@ -130,10 +130,9 @@ class Early:
     def _is_sure(self, candidate: Decided, point: int) -> bool:
         decision = _decision(candidate)
         novelty = self._info.novelty
-        if decision.label_distances is None or novelty is None:
-            raise InputError(
-                f"the model gives no distances of {candidate.task}'s labels"
-            )
+        # A model with decision points has both.
+        assert novelty is not None
+        assert decision.label_distances is not None
         label = self._task.labels.index(decision.label)
         excess = novelty.excess(point, decision.novelty)
         distances = decision.label_distances.tolist()
@@ -141,16 +140,15 @@ class Early:
 
     def _answered(self, candidate: Decided, sure: bool) -> Decided:
         """The answer of the rule."""
-        if candidate.label is not None and not sure and not is_fixed(self._rule):
-            candidate = candidate.flagged(unsure=True)
+        unsure = not (sure or candidate.label is None or is_fixed(self._rule))
         stopped_by = "confidence" if sure else "window"
         answer = replace(candidate, error=self._error, stopped_by=stopped_by)
-        return answer.flagged(tie=False)  # the rule does not go by votes
+        # The rule does not go by votes.
+        return answer.flagged(unsure=unsure, tie=False)
 
 
 class Product(Early):
-    """Decide when both factors are, by their labels. A pair that was never met has no
-    name."""
+    """Decide when both factors are, by their labels."""
 
     def answer(
         self,
@@ -162,28 +160,29 @@ class Product(Early):
         factors = self._task.factors
         if not decided.keys() >= factors.keys():
             return None
-        indices = {}
-        confidence = 1.0
-        sure = True
-        for factor in factors:
-            answer = decided[factor]
-            labels = self._info.tasks[factor].labels
-            indices[factor] = labels.index(str(answer.label))
-            confidence *= answer.confidence or 0.0
-            sure = sure and answer.stopped_by == "confidence"
-        index = product_label(factors, indices)
-        if index is None or candidate.label is None:
-            return self._answered(withheld(candidate), sure)
-        label = self._task.labels[index]
-        decision = _decision(candidate)._replace(label=label)
-        confidence = round(confidence, 6)
-        candidate = replace(
-            candidate,
-            label=label,
-            confidence=confidence,
-            decision=decision,
-        )
-        return self._answered(candidate, sure)
+        sure = all(decided[factor].stopped_by == "confidence" for factor in factors)
+        return self._answered(paired(self._info, candidate, decided), sure)
+
+
+def paired(
+    info: ModelInfo, candidate: Decided, decided: Mapping[str, Decided]
+) -> Decided:
+    """The answer to a product by its factors' labels. A pair that was never met has no
+    name."""
+    task = info.tasks[candidate.task]
+    indices = {}
+    likely = 1.0
+    for factor in task.factors:
+        answer = decided[factor]
+        indices[factor] = info.tasks[factor].labels.index(str(answer.label))
+        likely *= answer.confidence or 0.0
+    index = product_label(task.factors, indices)
+    if index is None or candidate.label is None:
+        return withheld(candidate)
+    label = task.labels[index]
+    decision = _decision(candidate)._replace(label=label)
+    confidence = round(likely, 6)
+    return replace(candidate, label=label, confidence=confidence, decision=decision)
 
 
 Policy = Uncertified | Early

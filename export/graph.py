@@ -262,9 +262,8 @@ def _doubt(
         [-2.0 * p.rows.T for p in points], np.int16, "columns of novelty"
     )
     squares = _apart(build, "novelty", y, y, columns, [p.rows for p in points])
-    product = build.node("Mul", build.node("Sqrt", outside), _nearest(build, squares))
-    units = build.by_decision_point([p.unit for p in points])
-    score = build.node("Mul", product, units)
+    nearest = _nearest(build, squares, [p.nearness for p in points])
+    score = build.node("Mul", build.node("Sqrt", outside), nearest)
     build.node("Squeeze", score, [1], output=names["novelty"])
     _remoteness(build, y, columns, points, names["remoteness"])
 
@@ -283,8 +282,7 @@ def _remoteness(
     factor = build.node("Mul", weighted, weights)
     rows = [p.rows * p.weights for p in points]
     squares = _apart(build, "remoteness", weighted, factor, columns, rows)
-    nearness = build.by_decision_point_small([p.nearness for p in points])
-    root = _nearest(build, build.node("Mul", squares, nearness))
+    root = _nearest(build, squares, [p.weighted_nearness for p in points])
     build.node("Squeeze", root, [1], output=output)
 
 
@@ -306,8 +304,10 @@ def _apart(
     return build.node("Add", squares, build.squared_length(y))
 
 
-def _nearest(build: Builder, squares: str) -> str:
-    """Name of the root (n, 1) of the smallest of squares (n, rows)."""
+def _nearest(build: Builder, squares: str, nearness: Sequence[Floats]) -> str:
+    """Name of the root (n, 1) of the smallest of squares (n, rows) times the nearness
+    (rows,) at each decision point."""
+    squares = build.node("Mul", squares, build.by_decision_point_small(nearness))
     nearest, _ = build.nodes("TopK", [squares, [1]], ["", ""], largest=0)
     return build.node("Sqrt", nearest)
 

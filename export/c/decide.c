@@ -175,7 +175,7 @@ static bool stop_product(const ec_task *task, answer *a) {
     a->label = pair;
     a->confidence = rounded(1.0 * f[0]->confidence * f[1]->confidence);
   }
-  return stop(a, task, sure);
+  return !task->has_rule || stop(a, task, sure);
 }
 
 /* Whether a task is decided at the decision point, by the rule certified for the error rate. */
@@ -185,10 +185,10 @@ static bool is_decided(uint32_t index) {
   if (!EC_EARLY || a->refused) return true;
   if (!task->has_rule) {
     a->flags |= EC_UNCERTIFIED;
-    return point == EC_POINTS - 1;
+    if (point != EC_POINTS - 1) return false;
   }
-  /* At a fixed window a product needs no answers of its factors. */
-  if (task->is_product && task->rule_confidence <= 1.0) return stop_product(task, a);
+  if (task->is_product) return stop_product(task, a);
+  if (!task->has_rule) return true;
   bool waits = a->flags & EC_UNUSUAL;
   double likely = confidence(&task->rule_curve, task, distances[index], a->decision_label);
   bool sure = likely >= task->rule_confidence;

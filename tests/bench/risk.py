@@ -17,8 +17,8 @@ its nested accuracy. The row "export" has the interval that an export at the ful
 prints. The accuracy on other trials may lie outside it in one data set of twenty.
 
 The last table judges the confidence at the full window on new trials of known objects:
-its calibration error, and how many of them are flagged `unknown` where 1 % are asked
-for. Further rows are of data sets that are exported in full but for four objects: the
+its calibration error, and how many of them are flagged `unknown`, where 1.25 % are
+asked for. Further rows are of data sets that are exported in full but for four objects: the
 board's own classifier decides on fresh touches of the others, and of the four that it
 never met.
 """

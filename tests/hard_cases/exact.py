@@ -112,6 +112,14 @@ def distance(square, unit):
     return root(square) * unit
 
 
+def least_root(apart, nearness):
+    """The root of the least square of whole differences (n, c), times the nearness
+    (n,), each rounded once."""
+    squares = (apart**2).sum(axis=1).tolist()
+    pairs = zip(squares, nearness.tolist(), strict=True)
+    return math.sqrt(min(float(Fraction(square) * Fraction(n)) for square, n in pairs))
+
+
 def doubt(space, point, vectors):
     """{name: (n,)} novelty and remoteness of vectors at a decision point, by the rule of
     `train.model.novelty`."""
@@ -129,13 +137,8 @@ def doubt(space, point, vectors):
     remoteness = []
     for outside, place in zip(squares.tolist(), places, strict=True):
         apart = rows - place
-        closest = min((apart**2).sum(axis=1).tolist())
-        weighted = ((apart * quarters) ** 2).sum(axis=1).tolist()
-        scaled = [
-            float(Fraction(square, 16) * Fraction(near))
-            for square, near in zip(weighted, at.nearness.tolist(), strict=True)
-        ]
-        remoteness.append(math.sqrt(min(scaled)))
-        product = float(Fraction(root(max(outside, 1))) * Fraction(root(closest)))
-        novelty.append(float(Fraction(product) * Fraction(at.unit)))
+        closest = least_root(apart, at.nearness)
+        novelty.append(float(Fraction(root(max(outside, 1))) * Fraction(closest)))
+        # With weights in quarters, the root is four times as long.
+        remoteness.append(least_root(apart * quarters, at.weighted_nearness) / 4.0)
     return {"novelty": np.array(novelty), "remoteness": np.array(remoteness)}

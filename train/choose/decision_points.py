@@ -103,7 +103,7 @@ def _size(points: int, dataset: DataSet, settings: Settings, samples: int) -> in
     trials = len(dataset.trials)
     shared = 2 * MOST_COMPONENTS * columns
     novelty = MOST_COMPONENTS * (2 * trials + 4 * MOST_COMPONENTS)
-    novelty += 8 * columns + 20 * trials
+    novelty += 8 * columns + 24 * trials
     early = settings.choices
     if settings.early is not None:
         early = {**early, **settings.early.choices}

@@ -166,7 +166,7 @@ def settle_early(
             errors = [decisions.error(means_s, tested) for decisions in decided]
             best[task].append(options[int(np.argmin(errors))][task])
     choices, *by_fold = by_folds(best)
-    return Early(window_s, choices, by_fold)
+    return Early(choices, by_fold)
 
 
 def _with_at_most(

@@ -5,14 +5,14 @@ of the features is centred, divided by its standard deviation and cut off, and p
 to principal components, which all decision points share. They are whitened by the
 spread within a label (Mahalanobis).
 
-Two scores are taken there. **Novelty** sees a changed body: it is the product of two
-lengths, of what lies outside the components, and of the distance to the nearest
-training trial. **Remoteness** sees a thing that was never met: it is the distance to
-the nearest training trial where directions that tell no labels apart count a quarter,
-over the distance at which that trial and its label have their own neighbours (as the
-local outlier factor of Breunig, Kriegel, Ng and Sander, 2000). The whitened axes are
-turned so that the discriminants of the labels come first (Fisher's, as the spread
-within labels is the same in all directions).
+Two scores are taken there, of the distance to the nearest training trial over that at
+which this trial and its label have their own neighbours (as the local outlier factor of
+Breunig, Kriegel, Ng and Sander, 2000). Without the latter, most of the trained things
+that are flagged would be of the label that varies most. **Novelty** sees a changed body:
+it is this ratio times the length of what lies outside the components. **Remoteness**
+sees a thing that was never met: it is the ratio where directions that tell no labels
+apart count a quarter. The whitened axes are turned so that the discriminants of the
+labels come first (Fisher's, as the spread within labels is the same in all directions).
 
 The fits of the folds make the same number of components of their own trials. So the
 scores of their held-out trials tell how high those of new contacts with trained objects
@@ -26,7 +26,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -38,9 +38,10 @@ from edge.arrays import Booleans, Floats, Integers
 from train.data.vectors import Strings
 from train.threads import single_thread
 
-UNUSUAL_RATE = 0.02
-UNKNOWN_RATE = 0.01
-"""Shares of contacts with trained things that may be flagged."""
+UNUSUAL_RATE = 0.01
+UNKNOWN_RATE = 0.0125
+"""Shares of contacts with trained things that may be flagged. Some have both flags, so
+that a fiftieth has any."""
 BESIDE = 0.25
 """Weight of directions that tell no labels apart, a power of two."""
 LEAST = 1e-3
@@ -80,8 +81,8 @@ class NoveltyPoint:
         rows: (n, components) whole coordinates of the training trials.
         weights: (components,) of coordinates in remoteness: 1 for discriminants, and
             `BESIDE`.
-        nearness: (n,) by which squared distances to the rows are multiplied.
-        unit: of the novelty, a power of two.
+        nearness, weighted_nearness: (n,) by which squared distances to the rows are
+            multiplied for novelty, and with the weights for remoteness.
     """
 
     mean: Floats
@@ -91,7 +92,7 @@ class NoveltyPoint:
     rows: Floats
     weights: Floats
     nearness: Floats
-    unit: float
+    weighted_nearness: Floats
 
 
 class Scores(NamedTuple):
@@ -156,12 +157,18 @@ class NoveltySpace:
         steps = _steps(x, point.mean, point.gain)
         z = _product(steps, self.weights, self.shift)
         outside = np.maximum((steps**2).sum(axis=1) - (z**2).sum(axis=1), 1.0)
-        y = _coordinates(z, point)
-        nearest = np.sqrt(cdist(y, point.rows, "sqeuclidean").min(axis=1))
-        weighted = y * point.weights
+        y = _coordinates(z, point.whitening, point.shift)
+        nearest = _nearest(y, point.rows, point.nearness)
         rows = point.rows * point.weights
-        squares = cdist(weighted, rows, "sqeuclidean") * point.nearness
-        return np.sqrt(outside) * nearest * point.unit, np.sqrt(squares.min(axis=1))
+        remoteness = _nearest(y * point.weights, rows, point.weighted_nearness)
+        return np.sqrt(outside) * nearest, remoteness
+
+
+def _nearest(y: Floats, rows: Floats, nearness: Floats) -> Floats:
+    """(m,) root of the least squared distance of points y (m, c) to rows (n, c), times
+    the nearness (n,) of these."""
+    squares = cdist(y, rows, "sqeuclidean") * nearness
+    return np.asarray(np.sqrt(squares.min(axis=1)))
 
 
 def _scale(x: Floats, widths: Sequence[int]) -> tuple[Floats, Floats]:
@@ -218,18 +225,17 @@ def _shift(values: Floats, bits: int) -> int:
     return int(bits - np.frexp(largest)[1])
 
 
-def _coordinates(z: Floats, point: NoveltyPoint) -> Floats:
+def _coordinates(z: Floats, whitening: Floats, shift: int) -> Floats:
     """Whole coordinates (m, components) of components."""
-    integers = _product(z, point.whitening, point.shift)
+    integers = _product(z, whitening, shift)
     return np.asarray(np.clip(integers, -FARTHEST, FARTHEST))
 
 
 def _point(mean: Floats, gain: Floats, z: Floats, labels: Strings) -> NoveltyPoint:
     """The constants of a decision point at which trials have the components z."""
-    within = z.copy()
-    for label in np.unique(labels):
-        of_label = labels == label
-        within[of_label] -= z[of_label].mean(axis=0)
+    names, classes = np.unique(labels, return_inverse=True)
+    means = np.stack([z[classes == i].mean(axis=0) for i in range(len(names))])
+    within = z - means[classes]
     components = z.shape[1]
     covariance = within.T @ within / len(z)
     variance = max(float(np.trace(covariance)) / components, 1.0)
@@ -237,28 +243,23 @@ def _point(mean: Floats, gain: Floats, z: Floats, labels: Strings) -> NoveltyPoi
     covariance += SHRINKAGE * variance * np.eye(components)
     values, axes = np.linalg.eigh(covariance)
     whitening = axes / np.sqrt(values)
-    whitening, directions = _turned(whitening, z, labels)
+    between = (means - z.mean(axis=0)) * np.sqrt(np.bincount(classes))[:, None]
+    whitening, directions = _turned(whitening, between)
     weights = np.where(np.arange(components) < directions, 1.0, BESIDE)
     fine = _shift(whitening, WHITENING_BITS)
     integers = np.rint(np.ldexp(whitening, fine))
-    digits = _shift(z @ whitening, STORED_BITS - 1)
-    unit = 2.0 ** -(digits + STEP_BITS)
-    none = np.ones(len(z))
-    point = NoveltyPoint(mean, gain, integers, fine - digits, z, weights, none, unit)
-    rows = _coordinates(z, point)
-    return replace(point, rows=rows, nearness=_nearness(rows * weights, labels))
+    shift = fine - _shift(z @ whitening, STORED_BITS - 1)
+    rows = _coordinates(z, integers, shift)
+    nearness = _nearness(rows, labels)
+    weighted = _nearness(rows * weights, labels)
+    return NoveltyPoint(mean, gain, integers, shift, rows, weights, nearness, weighted)
 
 
-def _turned(whitening: Floats, z: Floats, labels: Strings) -> tuple[Floats, int]:
+def _turned(whitening: Floats, between: Floats) -> tuple[Floats, int]:
     """A whitening turned so that the discriminants of the labels come first, and how
-    many they are."""
-    whitened = z @ whitening
-    names, classes = np.unique(labels, return_inverse=True)
-    sizes = np.bincount(classes)
-    means = np.stack([whitened[classes == i].mean(axis=0) for i in range(len(names))])
-    between = (means - whitened.mean(axis=0)) * np.sqrt(sizes)[:, None]
-    axes = np.linalg.svd(between)[2]
-    return whitening @ axes.T, min(len(names) - 1, len(axes))
+    many they are, from the labels' weighted deviations (labels, components)."""
+    axes = np.linalg.svd(between @ whitening)[2]
+    return whitening @ axes.T, min(len(between) - 1, len(axes))
 
 
 def _nearness(rows: Floats, labels: Strings) -> Floats:
@@ -317,18 +318,24 @@ def limits_of(scores: Floats, rate: float) -> tuple[tuple[float, ...], ...]:
     `rate` of contacts exceeds.
 
     Few scores lie beyond a tenth. So the tail of the logarithm is taken for
-    exponential, with the mean excess over that tenth.
+    exponential, with the mean excess over that tenth. A mean of few is itself a guess:
+    the limit is that of the next score, given these (its excess is Lomax, with their
+    number as its shape), so that the share is right over many sets of trials. Of a
+    rarer share than one of them few trials say nothing, so it is at least that.
 
     Args:
         scores: (decision points, n) of held-out trials.
         rate: at most a tenth.
     """
-    logs = np.log(np.maximum(scores, LEAST))
-    tails = np.quantile(logs, 1.0 - TAIL, axis=1)
-    limits = []
-    for row, tail in zip(logs, tails.tolist(), strict=True):
-        excess = float((row[row >= tail] - tail).mean())
-        limits.append(math.exp(tail + excess * math.log(TAIL / rate)))
+    logs = np.sort(np.log(np.maximum(scores, LEAST)), axis=1)
+    trials = logs.shape[1]
+    count = math.ceil(TAIL * trials)
+    tails = logs[:, -count - 1]
+    excess = logs[:, -count:].mean(axis=1) - tails
+    share = (count + 1) / (trials + 1)
+    least = max(rate, 1.0 / (trials + 1))
+    reach = count * ((share / least) ** (1.0 / count) - 1.0)
+    limits = np.exp(tails + excess * reach).tolist()
     typical = np.exp(np.median(logs, axis=1)).tolist()
     return tuple(typical), tuple(limits)
 

@@ -15,7 +15,7 @@ a fold's trials come from a logistic regression on the other folds.
 Tasks that agree (`edge.model.agreement`) have one rule: the factors are decided when
 each is sure, their product when both are, and the tests count the product's errors.
 Below the smallest error that is certified for the product, each factor has rules of its
-own. Where these are faster, the product waits for a fixed window (`agreeing`).
+own (`agreeing`).
 
 The tests are exact for the average of the folds' models. The exported model is fitted
 on all trials, a tenth (or a fifth) more, with its own choice of settings. On average it
@@ -27,6 +27,7 @@ explains. With the full risk for the tests, the smallest certified error was exc
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import cycle
 
 import numpy as np
 from scipy.special import expit
@@ -86,11 +87,12 @@ class Course:
     unusual: Booleans
     withheld: Booleans | None = None
 
-    def under(self, rule: StoppingRule) -> tuple[Integers, Booleans]:
+    def under(self, *rules: StoppingRule) -> tuple[Integers, Booleans]:
         """(n,) the decision point at which a rule decides, and whether the answer is
-        wrong."""
+        wrong; or a rule for each part."""
         trials = np.arange(self.unusual.shape[1])
-        at = [stops(confidence, rule, self.unusual) for confidence in self.confidences]
+        parts = zip(self.confidences, cycle(rules), strict=False)
+        at = [stops(confidence, rule, self.unusual) for confidence, rule in parts]
         last = np.max(at, axis=0)
         pairs = zip(self.wrong, at, strict=True)
         wrong = [of_part[points, trials] for of_part, points in pairs]
@@ -153,8 +155,8 @@ def agreeing(
 
     A factor is wrong only where its product is, so it may follow the product's rules.
     Before them it has its own that err less often. No rule is slower for a factor than
-    those before it: one that waits for confidence is left out then, and a fixed window
-    serves the product alone, which needs no answers of its factors for it.
+    those before it. The product, which takes its factors' labels, has the rules that
+    both follow. Where there are none, it has the errors of the factors' fastest ones.
 
     Args:
         product: a task.
@@ -164,22 +166,25 @@ def agreeing(
         seconds: (points,) windows.
     """
     least = rules[product][0].error
-    agreed: dict[str, list[StoppingRule]] = {product: []}
+    agreed = {}
     for factor in factors:
         agreed[factor] = [rule for rule in rules[factor] if rule.error < least]
+    of_product: list[StoppingRule] = []
     for rule in rules[product]:
-        followed = _followed(rule, {f: agreed[f] for f in factors}, courses, seconds)
-        if is_fixed(rule) or len(followed) == len(factors):
-            followed[product] = rule
-        elif not agreed[product]:
-            # The full window errs no more often than any rule that is tested after it.
-            waits = replace(rule, mean_s=float(seconds[-1]), confidence=NEVER)
-            followed = {product: waits}
-        else:
-            followed = {}
-        for task, of_task in followed.items():
-            agreed[task].append(of_task)
-    return agreed
+        followed = _followed(rule, agreed, courses, seconds)
+        if len(followed) == len(factors):
+            of_product.append(rule)
+        elif of_product:
+            # Factors that go on by themselves would make the product err more often.
+            continue
+        for factor, of_factor in followed.items():
+            agreed[factor].append(of_factor)
+    if not of_product:
+        at, wrong = courses[product].under(*(of[-1] for of in agreed.values()))
+        limit = upper_limit(int(wrong.sum()), len(wrong), TEST_SHARE * RISK / 2.0)
+        mean_s = float(seconds[at].mean())
+        of_product = [StoppingRule(limit, mean_s, NEVER, len(seconds) - 1)]
+    return {product: of_product, **agreed}
 
 
 def _followed(

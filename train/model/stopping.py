@@ -1,7 +1,7 @@
 """Deciding as soon as it is sure: a calibrated confidence at each decision point.
 
 A model decides at several decision points, each with a window, a projection and
-training rows of its own. Those before some time may have settings of their own too
+training rows of its own. Those before the last may have settings of their own too
 (`Early`): early the arm tells what the skin tells later. Confidence, rules and novelty
 limits are made from trials that the deciding model did not see: the trials are divided
 into folds, and each fold is decided by a model that was fitted, and whose settings were
@@ -72,15 +72,13 @@ FEWEST = 20
 
 @dataclass(frozen=True)
 class Early:
-    """Settings of the decision points before some time.
+    """Settings of the decision points before the full window.
 
     Attributes:
-        until_s: the time.
         choices: {task: Choice}; a task without one has the settings of the full window.
         by_fold: [fold]{task: the choice made without the fold's trials}.
     """
 
-    until_s: float
     choices: Choices
     by_fold: Sequence[Choices]
 
@@ -171,7 +169,8 @@ class SequentialClassifier:
         self._tested = {task: (folds >= 0) & (y[task] != "") for task in self.choices}
         taken = self._fit_points(vectors)
         self._fit_novelty(taken, folds)
-        of_folds = self.without(fold_choices, self.early)
+        early = [{}] * len(fold_choices) if self.early is None else self.early.by_fold
+        of_folds = list(map(self._at_points, fold_choices, early))
         of_all = [self.choices_at] * len(of_folds)
         chosen_without, chosen_by_all = held_out(
             vectors,
@@ -185,10 +184,9 @@ class SequentialClassifier:
         self.stopping_ = self._with_curves(
             self._certified(chosen_without), chosen_by_all, unseen
         )
-        of_name = self.stopping_[self._name]
         self.remoteness_ = replace(self._bare, worth=self._worth(never_met))
-        named = replace(of_name, remoteness=self.remoteness_)
-        self.stopping_ = {**self.stopping_, self._name: named}
+        named = replace(self.stopping_[self._name], remoteness=self.remoteness_)
+        self.stopping_[self._name] = named
         return self
 
     @property
@@ -197,23 +195,11 @@ class SequentialClassifier:
         early = {} if self.early is None else self.early.choices
         return self._at_points(self.choices, early)
 
-    def without(
-        self,
-        fold_choices: Sequence[Choices],
-        early: Early | None,
-    ) -> list[AtPoints]:
-        """[fold][decision point]{task: the choice made without the fold's trials}."""
-        early_choices = [{}] * len(fold_choices) if early is None else early.by_fold
-        return list(map(self._at_points, fold_choices, early_choices))
-
     def _at_points(self, full: Choices, early: Choices) -> AtPoints:
         """[decision point]{task: Choice} of choices for the full window and for early
         points."""
-        until_s = 0.0 if self.early is None else self.early.until_s
-        return [
-            {**full, **early} if seconds < until_s else full
-            for seconds in self.decision_points_s
-        ]
+        before = len(self.decision_points_s) - 1
+        return [*[{**full, **early}] * before, full]
 
     def _fit_points(self, vectors: Vectors) -> Vectors:
         """Fit the classifier of each decision point; the vectors that these take."""

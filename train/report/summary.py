@@ -50,7 +50,7 @@ def summary(fitted: Fitted, prices: Prices) -> str:
         lines.append(f"  {_described(chosen.choice, fitted)}")
         if fitted.early is not None:
             early = _described(fitted.early.choices[task], fitted)
-            lines.append(f"  before {fitted.early.until_s:g} s: {early}")
+            lines.append(f"  before {fitted.window_s:g} s: {early}")
     lines += ["", *_by_unit(fitted.dataset.units)]
     if any(map(moves, map(measures.feature, fitted.dataset.names))):
         frame = "along the skin" if fitted.dataset.chain is None else "in the world"

@@ -77,7 +77,6 @@ def test_decision_points_before_the_full_window_have_settings_where_joints_are_k
     make_touch, tmp_path
 ):
     early = early_settings(make_touch, tmp_path, arm=True, k=3)
-    assert early.until_s == 1.2
     assert early.choices["softness"].projection == "lda"
     assert len(early.by_fold) == 10
     # The number of neighbours is that of the full window, as the graph has one.

@@ -131,6 +131,7 @@ class TestProduct:
         courses = {
             "fast": course(self.FAST, self.WRONG),
             "slow": course(self.SLOW, self.WRONG),
+            "product": self.product(),
         }
         by_task = agreeing(
             "product", known, {"product": rules, **known}, courses, SECONDS
@@ -148,14 +149,20 @@ class TestProduct:
         assert factor == [own, window, replace(sure, mean_s=0.4)]
 
     def test_a_factor_is_never_slower_at_a_looser_error(self):
-        """The product waits for a fixed window until its rule is as fast."""
+        """The product has the rules that both follow."""
         own = StoppingRule(0.1, 0.4, 0.8, 2)
         window = StoppingRule(0.2, 1.2, NEVER, 2)
         slow = StoppingRule(0.3, 1.2, 0.95, 2)
         fast = StoppingRule(0.4, 1.0, 0.7, 2)
         product, factor = self.agreeing(own, window, slow, fast)
-        assert product == [window, fast]
+        assert product == [fast]
         assert factor == [own, replace(fast, mean_s=0.4)]
-        product, factor = self.agreeing(own, replace(slow, error=0.2))
-        assert product == [window]
+
+    def test_a_product_that_no_factor_follows_has_the_errors_of_both(self):
+        own = StoppingRule(0.1, 0.4, 0.8, 2)
+        slow = StoppingRule(0.2, 1.2, 0.95, 2)
+        product, factor = self.agreeing(own, slow)
         assert factor == [own]
+        wrong = self.product().under(slow)[1]
+        limit = upper_limit(int(wrong.sum()), 2, 0.025)
+        assert product == [StoppingRule(limit, 1.2, NEVER, 2)]
