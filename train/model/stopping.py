@@ -61,6 +61,7 @@ from train.model.novelty import (
     beyond,
     held_out_scores,
     limits_of,
+    telling_columns,
 )
 from train.model.pipeline import Choices, ContactClassifier
 from train.model.rules import RISK, Course, agreeing, candidates, certify
@@ -121,6 +122,8 @@ class SequentialClassifier:
         jobs: processes.
         widths: columns of each feature type; equal where None.
         early: settings of early decision points; those of the full window where None.
+        drawn: whether a scene drew the trained things, so that the model is for other
+            arms than the scene's.
 
     Attributes:
         decision_points_: a fitted `ContactClassifier` for each decision point.
@@ -139,6 +142,7 @@ class SequentialClassifier:
     jobs: int = 1
     widths: Sequence[int] | None = None
     early: Early | None = None
+    drawn: bool = False
 
     def fit(
         self,
@@ -235,8 +239,9 @@ class SequentialClassifier:
         names = self.choices.keys() - kinds or self.choices.keys()
         self._name = finest({task: vectors.y[task] for task in names})
         labels = vectors.y[self._name]
+        telling = telling_columns(vectors) if self.drawn else None
         with single_thread():
-            self.space_ = NoveltySpace.of(vectors.X, labels, vectors.columns)
+            self.space_ = NoveltySpace.of(vectors.X, labels, vectors.columns, telling)
         novelty_folds = np.where(folds >= 0, stratified_folds(labels, FOLDS), -1)
         scores = held_out_scores(
             vectors.X,
@@ -244,6 +249,7 @@ class SequentialClassifier:
             novelty_folds,
             vectors.columns,
             self.jobs,
+            telling,
         )
         tested = scores.part(folds >= 0)
         self.novelty_ = Novelty(*limits_of(tested.novelty, UNUSUAL_RATE))
@@ -257,6 +263,7 @@ class SequentialClassifier:
                 self._things,
                 vectors.columns,
                 self.jobs,
+                telling,
             )
             left_out = self._left_out.part(self._things >= 0).remoteness
         self._bare = remoteness_of(tested.remoteness, left_out)

@@ -167,7 +167,6 @@ class Scene:
     """When and by how much an object must do as its label says."""
     objects: tuple[SceneObject, ...]
     add: tuple[str, ...]
-    leave_out: tuple[str, ...]
     settings: dict[str, dict[str, float]] = field(default_factory=dict)
 
     @cached_property

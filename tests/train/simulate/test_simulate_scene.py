@@ -96,16 +96,6 @@ MISTAKES = [
     ),
     ("effects.add", ["stems"], "it needs an object of family foliage"),
     ("effects.add", ["cover"], "it needs an object with cover_n_m"),
-    (
-        "effects.leave_out",
-        ["tilt"],
-        "must be a list without tilt, which effects.add adds",
-    ),
-    (
-        "effects.leave_out",
-        ["sliding"],
-        "leaves out sliding, without which object 'thing'",
-    ),
     ("object", {}, "object must be a list of tables, not {}"),
     ("object", [], "give at least one [[object]] or [[family]]"),
     (

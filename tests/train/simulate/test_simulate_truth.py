@@ -164,9 +164,3 @@ class TestLimits:
         assert math.degrees(batch.joints[0, :, 0].max()) <= 120.0
         force = batch.force[0]
         assert force[-1] == pytest.approx(force[-500], rel=1e-3)
-
-    def test_leaving_out_the_effect_that_makes_it_soft_is_refused(self):
-        foam = scenes.one_object(family="foam")
-        sentence = "leaves out foundation, without which .* be soft"
-        with pytest.raises(InputError, match=sentence):
-            scene(*foam, effects={"leave_out": ["foundation"]})
