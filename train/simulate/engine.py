@@ -96,8 +96,8 @@ def _values(scene: Scene, trials: list[TrialSpec]) -> dict[str, Any]:
     for spread, deviation in scene.spread.items():
         if deviation:
             away = deviation * drawn(f"spread.{spread}", "standard_normal")
-            if spread in out:
-                out[spread] = out[spread] + away
+            if spread in out or spread == "travel_s":
+                out[spread] = out.get(spread, scene.travel_s) + away
             for name in out.keys() & SCALED.get(spread, ()):
                 out[name] = out[name] * np.exp(away)
     return out

@@ -78,6 +78,7 @@ SPREAD = {
     "friction": Field(0.0, 1.0, 0.0),
     "mass": Field(0.0, 1.0, 0.0),  # as a part of its value
     "cover": Field(0.0, 1.0, 0.0),  # of the skin's and the cover's stiffness, as a part
+    "travel_s": Field(0.0, 10.0, 0.0),  # time at which the arm halts
 }
 SPREAD_OF_MOVABLE = {"slope_deg": "mass_kg", "aside_m": "foot_m"}
 """{spread around 0: the other key that a movable object needs for it}; the object need

@@ -9,7 +9,7 @@ import pytest
 from edge.errors import InputError
 from tests.train.simulate import scenes
 from tests.train.simulate.scenes import run
-from train.simulate import convergence, truth
+from train.simulate import convergence, engine, truth
 from train.simulate.run import simulate, write
 
 (BOX,) = scenes.movable([0.5, 6.0], 0.6, 0.5, width_m=0.05, name="box")
@@ -68,9 +68,19 @@ class TestLabels:
         heavy = scene({**BOX, "mass_kg": 20.0})
         refused(heavy, r"'box' is labelled movable.* moved 0 mm.*lower")
 
-    def test_a_soft_object_that_never_yields_is_refused(self):
+    def test_a_soft_object_that_never_yields_is_refused(self, monkeypatch):
+        runs = []
+
+        def counted(*arguments):
+            runs.append(arguments)
+            return engine.run_physics(*arguments)
+
+        monkeypatch.setattr(truth, "REDRAWS", 40)
+        monkeypatch.setattr(truth, "run_physics", counted)
         stone = scenes.one_object(name="stone", family="foam", modulus_pa=1e9)
         refused(scene(*stone), "'stone' is labelled soft.*lower its stiffness")
+        # Each run has more of the further draws.
+        assert len(runs) == 4
 
     def test_a_motion_that_never_touches_is_refused(self):
         trial_scene = scene({**BOX, "conditions": ["fixed"]})

@@ -11,7 +11,6 @@ real plants stand was not measured.
 
 import numpy as np
 
-from train.simulate import streams
 from train.simulate.trials import Trials
 
 
@@ -26,12 +25,7 @@ def fill(t: Trials) -> None:
     """Turn the stems that were laid across the forearm upright."""
     state = t.states["stems"]
     skin = t.scene.skin
-    across = np.zeros_like(state.depth)
-    for trial, place in enumerate(t.places):
-        spec = t.batch.specs[place]
-        generator = streams.stream(t.scene.seed, "upright", spec.key, spec.number)
-        across[:, trial] = generator.uniform(-0.5, 0.5, len(across))
-    sine = across * t.values["breadth_m"] / skin.radius_m
+    sine = (state.along - 0.5) * t.values["breadth_m"] / skin.radius_m
     # One stem at least is met.
     sine[0] = np.clip(sine[0], -1.0, 1.0)
     met = (np.abs(sine) <= 1.0) & (state.stiffness > 0.0)
