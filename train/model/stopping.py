@@ -58,6 +58,7 @@ from train.model.novelty import (
     FOLDS,
     UNUSUAL_RATE,
     NoveltySpace,
+    Scores,
     beyond,
     held_out_scores,
     limits_of,
@@ -243,28 +244,20 @@ class SequentialClassifier:
         with single_thread():
             self.space_ = NoveltySpace.of(vectors.X, labels, vectors.columns, telling)
         novelty_folds = np.where(folds >= 0, stratified_folds(labels, FOLDS), -1)
-        scores = held_out_scores(
-            vectors.X,
-            labels,
-            novelty_folds,
-            vectors.columns,
-            self.jobs,
-            telling,
-        )
+
+        def scores_without(folds: Integers) -> Scores:
+            return held_out_scores(
+                vectors.X, labels, folds, vectors.columns, self.jobs, telling
+            )
+
+        scores = scores_without(novelty_folds)
         tested = scores.part(folds >= 0)
         self.novelty_ = Novelty(*limits_of(tested.novelty, UNUSUAL_RATE))
         self._excess = excess_of(self.novelty_, scores.novelty)
         self._things = thing_folds(np.where(folds >= 0, labels, ""))
         left_out = None
         if self._things is not None:
-            self._left_out = held_out_scores(
-                vectors.X,
-                labels,
-                self._things,
-                vectors.columns,
-                self.jobs,
-                telling,
-            )
+            self._left_out = scores_without(self._things)
             left_out = self._left_out.part(self._things >= 0).remoteness
         self._bare = remoteness_of(tested.remoteness, left_out)
         self._known = known_of(self._bare, scores.remoteness)

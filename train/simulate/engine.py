@@ -78,8 +78,7 @@ def _values(scene: Scene, trials: list[TrialSpec]) -> dict[str, Any]:
     numbers = np.array([trial.number for trial in trials])
     values = {
         **first.object.values,
-        "lead_s": scene.lead,
-        "taxel_n_m": scene.taxel_n_m,
+        **scene.values,
         **PLACED,
     }
     suffix = f".{first.attempt}" if first.attempt else ""
@@ -96,8 +95,8 @@ def _values(scene: Scene, trials: list[TrialSpec]) -> dict[str, Any]:
     for spread, deviation in scene.spread.items():
         if deviation:
             away = deviation * drawn(f"spread.{spread}", "standard_normal")
-            if spread in out or spread == "travel_s":
-                out[spread] = out.get(spread, scene.travel_s) + away
+            if spread in out:
+                out[spread] = out[spread] + away
             for name in out.keys() & SCALED.get(spread, ()):
                 out[name] = out[name] * np.exp(away)
     return out

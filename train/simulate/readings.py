@@ -27,7 +27,6 @@ class Readings:
         t: (frames,) seconds.
         counts: (frames, rows, cols) of each taxel.
         joints: (frames, dof) radians.
-        times: (frames,) seconds, if a clock effect shifts them.
         kept: (frames,) whether each frame arrives, if some are lost.
         valid: (rows, cols) whether each taxel works, if dead ones are known.
         images: {effect: (frames, rows, cols, images) further counts of each taxel} of
@@ -41,7 +40,6 @@ class Readings:
     t: Array
     counts: NDArray[np.float32]
     joints: Array
-    times: Array | None = None
     kept: Mask | None = None
     valid: Mask | None = None
     images: dict[str, NDArray[np.float32]] = field(default_factory=dict)

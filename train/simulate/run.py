@@ -52,13 +52,12 @@ def recordings(
     `readings`."""
     for reading in readings(physics, which):
         arrived = slice(None) if reading.kept is None else reading.kept
-        t = reading.t if reading.times is None else reading.times
         shear = reading.shear()
         file = file_name(reading.scene, reading.trial)
         yield (
             file,
             Recording(
-                t=t[arrived],
+                t=reading.t[arrived],
                 frames=reading.frames()[arrived],
                 joints=reading.joints[arrived],
                 valid=reading.valid,

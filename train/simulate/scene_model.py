@@ -180,6 +180,14 @@ class Scene:
         return [(item, c) for item in self.objects for c in item.conditions]
 
     @property
+    def values(self) -> dict[str, Value]:
+        """{name: value} of trials with any object."""
+        values = {"lead_s": self.lead, "taxel_n_m": self.taxel_n_m}
+        if self.spread.get("travel_s"):
+            values["travel_s"] = Value(self.travel_s, self.travel_s)
+        return values
+
+    @property
     def rate_hz(self) -> float:
         """Frames a second."""
         return self.trials["rate_hz"]

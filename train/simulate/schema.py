@@ -201,15 +201,11 @@ EFFECTS: dict[str, Effect] = {
     "saturation": Effect("sensor", {"newton": above_0(1e6, 17.0)}),  # newton: the limit
     # counts: readings below are zero
     "dead_band": Effect("sensor", {"counts": Field(0.0, 65535, 50.0)}),
-    # counts: size of a step
-    "quantisation": Effect("sensor", {"counts": Field(1.0, 65535, 4.0)}),
     # part: of all taxels; known: 1, they are marked invalid; 0, they read zero
     "dead_taxels": Effect(
         "sensor",
         {"part": Field(0.0, 1.0, 0.01), "known": Field(0, 1, 1, integer=True)},
     ),
-    # s: deviation, cut at 0.45 of a frame
-    "jitter": Effect("clock", {"s": Field(0.0, 1.0, 0.001)}),
     # part: of all frames
     "dropped_frames": Effect("clock", {"part": Field(0.0, 0.9, 0.02)}),
 }

@@ -115,10 +115,6 @@ class TestSensors:
     def test_saturation_cuts_the_counts(self):
         assert recorded(saturation={"newton": 0.5}).frames.max() == 500
 
-    def test_quantisation_leaves_whole_steps(self):
-        frames = recorded(quantisation={"counts": 64}).frames
-        assert set(np.unique(frames % 64)) == {0}
-
     def test_a_dead_band_leaves_no_small_counts(self):
         frames = recorded(dead_band={"counts": 300}).frames
         assert frames[frames > 0].min() >= 300
@@ -130,11 +126,6 @@ class TestSensors:
 
     def test_unknown_dead_taxels_are_not_told(self):
         assert recorded(dead_taxels={"part": 0.3, "known": 0}).valid is None
-
-    def test_jitter_shifts_the_times(self):
-        between = np.diff(recorded(jitter={"s": 0.002}).t)
-        assert len(np.unique(between.round(6))) > 10
-        assert (between > 0.0).all()
 
     def test_dropped_frames_are_missing_and_the_others_stay(self, plain):
         fewer = recorded(dropped_frames={"part": 0.4})

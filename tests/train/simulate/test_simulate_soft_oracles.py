@@ -286,6 +286,7 @@ def test_upright_stems_are_lines_beside_a_cylinder():
     # to within the columns' pitch of 15 degrees.
     assert stems.depth[met].min() == 0.0
     assert_allclose(stems.depth[met], RADIUS * (1.0 - np.cos(angle)), atol=0.007)
+    assert "upright" in trials.plan.calls
     pressed = (batch.counts > 0).any(axis=1)
     assert pressed[:, -1].any()
     assert not pressed[:, :-1].any()

@@ -47,7 +47,7 @@ def swing(t: Trials) -> None:
     reached = np.where(moves, way / np.where(moves, np.abs(rate), 1.0), np.inf)
     t.arm.start = start
     travel_s = t.scene.travel_s
-    if t.scene.spread.get("travel_s"):
+    if "travel_s" in t.scene.values:
         least = t.values["lead_s"] + PUSHES_S
         travel_s = np.maximum(t.values["travel_s"], least)
     t.arm.travel_s = np.minimum(travel_s, reached)
