@@ -194,8 +194,6 @@ EFFECTS: dict[str, Effect] = {
     "crosstalk": Effect("sensor", {"part": Field(0.0, 0.2, 0.02)}),
     # counts: half the loop's width
     "hysteresis": Effect("sensor", {"counts": Field(0.0, 65535, 30.0)}),
-    # counts_per_s: deviation of slopes
-    "drift": Effect("sensor", {"counts_per_s": Field(0.0, 65535, 5.0)}),
     # counts: standard deviation
     "noise": Effect("sensor", {"counts": Field(0.0, 65535, 8.0)}),
     "saturation": Effect("sensor", {"newton": above_0(1e6, 17.0)}),  # newton: the limit

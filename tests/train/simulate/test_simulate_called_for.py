@@ -79,7 +79,7 @@ def modules_of(effects):
 
 def test_adding_an_effect_leaves_the_others_draws():
     trial_scene = scene("noise")
-    other_scene = scene("noise", "dead_taxels", "drift", "dropped_frames", "tilt")
+    other_scene = scene("noise", "dead_taxels", "crosstalk", "dropped_frames", "tilt")
     trials = tuple(next(iter(kinds(trial_scene).values())))
     a = values_of(trial_scene, trials)
     b = values_of(other_scene, trials)
@@ -116,7 +116,7 @@ def test_these_trials_call_for_every_effect(plan):
 
 def bits(batch, i):
     """{name: bytes} of what a trial's recording is made of."""
-    names = ("times", "kept", "valid")
+    names = ("kept", "valid")
     arrays = {name: getattr(batch.all_readings[i], name) for name in names}
     arrays |= {name: getattr(batch, name)[i] for name in ("counts", "joints", "force")}
     return {name: a.tobytes() for name, a in arrays.items() if a is not None}
@@ -128,7 +128,7 @@ def test_results_do_not_depend_on_the_batch():
     trial_scene = scene(*add, objects=everything(), after_s=0.4, count=2)
     every = tuple(spec for specs in kinds(trial_scene).values() for spec in specs)
     together = run_batch(trial_scene, every)
-    assert len(bits(together, 0)) == 6
+    assert len(bits(together, 0)) == 5
     alone = [(spec,) for spec in every[::2]]
     for specs in (*alone, every[::-1], every[3:10]):
         chosen = run_batch(trial_scene, specs)

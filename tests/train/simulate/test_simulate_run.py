@@ -145,10 +145,6 @@ class TestSensors:
         rest = recorded(noise={"counts": 6}).frames[:10].astype(float)
         assert 6 * 0.35 < rest.mean() < 6 * 0.45  # 0.4 deviations
 
-    def test_a_baseline_drifts(self):
-        frames = recorded(drift={"counts_per_s": 50}).frames
-        assert frames[-1].mean() > frames[5].mean() > 0.0
-
 
 class TestCommand:
     def test_simulate_writes_and_says_how_many(self, tmp_path, capsys):
