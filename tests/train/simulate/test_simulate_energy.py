@@ -19,6 +19,7 @@ from train.simulate.plan import Call, make_plan
 from train.simulate.schema import EFFECTS
 
 RANGES = {
+    "stem_height_m": [0.3, 0.6],
     "mass_kg": [0.02, 1.0],
     "friction_static": [0.5, 1.1],
     "friction_kinetic": [0.1, 0.5],
