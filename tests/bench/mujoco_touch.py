@@ -52,6 +52,9 @@ PAD_LOSS_S = 0.0015
 RIGID = "-1e6 -2e3"
 """Where solimp is s, a contact is s / (1 - s) times as stiff as solref times the
 mass."""
+STEP_S = 0.001
+STEMS_STEP_S = 0.00025
+"""Stems of 10 g hop in steps as long as the contact's time constant."""
 RIGID_KINDS = ("box", "drum")
 HALF_M = 0.08
 """Half the length of a thing's foot along the push, and at least half its breadth."""
@@ -266,6 +269,7 @@ def model_of(touch):
         "pad_kg": PAD_KG,
         "pad_loss": PAD_LOSS_S * k,
         "contact": RIGID,
+        "step_s": STEMS_STEP_S if thing.kind == "plant" else STEP_S,
         "dimensions": 3,
         "foot_x": HALF_M,
         "x": x,

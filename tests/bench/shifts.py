@@ -45,8 +45,6 @@ UNSURE = 0.5
 SURE = 0.95
 LATE = ((10, 0), (0, 0))
 """Frames before and after, and joints, by which late angles are padded."""
-LATE = ((10, 0), (0, 0))
-"""Frames before and after, and joints, by which late angles are padded."""
 FEW = 1 / 20
 """Share of the sure answers that may be wrong."""
 

@@ -129,7 +129,8 @@ def touches(seed, trials):
 
 
 def judge(model, touch):
-    """A row: whether a model decides the tasks of a touch rightly.
+    """A row: whether a model decides the tasks of a touch rightly, and how many of its
+    right and of its wrong answers are called unusual.
 
     A contact without a decision counts as wrong.
     """
@@ -139,7 +140,12 @@ def judge(model, touch):
     summary.add(recording.labels, events)
     row = {"trials": habit, "kind": recording.labels["object"]}
     row |= {f"{task} right": summary.right(task)[0] for task in TASKS}
-    row["unknown"] = int(any("unusual" in event.get("flags", ()) for event in events))
+    row |= {"right and unusual": 0, "wrong and unusual": 0}
+    for event in events:
+        if (task := event.get("task")) in TASKS:
+            right = event["label"] == recording.labels[task]
+            column = f"{'right' if right else 'wrong'} and unusual"
+            row[column] += "unusual" in event.get("flags", ())
     return row | {"number": 1}
 
 

@@ -35,7 +35,8 @@ from scipy.linalg import eigh
 from scipy.spatial.distance import cdist
 
 from edge.arrays import Booleans, Floats, Integers
-from train.data.vectors import Strings
+from edge.touch.measures import feature
+from train.data.vectors import Strings, Vectors
 from train.threads import single_thread
 
 UNUSUAL_RATE = 0.01
@@ -55,6 +56,9 @@ TRIALS_A_COMPONENT = 3
 """A component needs so many trials."""
 LEAST_SHARE = 0.02
 """Least standard deviation of a column, as a share of its feature's."""
+MOVED_SHARE = 0.05
+"""Least standard deviation of a joint's column that may tell of a changed body, where a
+scene drew the trained things, as a share of its feature's largest."""
 CLIP = 6.0
 """Standard deviations at which a column is cut off."""
 STEP_BITS = 12
@@ -126,17 +130,27 @@ class NoveltySpace:
     points: tuple[NoveltyPoint, ...]
 
     @classmethod
-    def of(cls, X: Floats, labels: Strings, widths: Sequence[int]) -> NoveltySpace:
+    def of(
+        cls,
+        X: Floats,
+        labels: Strings,
+        widths: Sequence[int],
+        telling: Booleans | None = None,
+    ) -> NoveltySpace:
         """The space of some trials.
 
         Args:
             X: (decision points, n, p) their vectors.
             labels: (n,) whose trials are alike.
             widths: columns of each feature type.
+            telling: (p,) whether columns count; all do where None.
         """
-        scales = [_scale(x, widths) for x in X]
+        if telling is None:
+            telling = np.ones(X.shape[-1], dtype=np.bool_)
+        scales = [_scale(x, widths, telling) for x in X]
         steps = [_steps(x, *scale) for x, scale in zip(X, scales, strict=True)]
-        trials, columns = X.shape[1:]
+        trials = X.shape[1]
+        columns = int(telling.sum())
         # Half of the columns, so that something can lie outside the components.
         most = min(MOST_COMPONENTS, trials // TRIALS_A_COMPONENT, columns // 2)
         axes = _axes(np.concatenate(steps), max(most, 1))
@@ -171,8 +185,30 @@ def _nearest(y: Floats, rows: Floats, nearness: Floats) -> Floats:
     return np.asarray(np.sqrt(squares.min(axis=1)))
 
 
-def _scale(x: Floats, widths: Sequence[int]) -> tuple[Floats, Floats]:
-    """Mean (p,) of each column of x (n, p), and its steps a unit (p,)."""
+def telling_columns(vectors: Vectors) -> Booleans:
+    """(p,) whether columns may tell of a changed body, where a scene drew the things of
+    the vectors (decision points, n, p).
+
+    A model of such things is for arms of which a scene knows only the outlines. So a
+    joint counts if it moves in the scene, by how far it has moved in the end: its
+    simulated course is smooth, and follows from the others to a thousandth of a radian.
+    """
+    telling = np.ones(vectors.X.shape[-1], dtype=np.bool_)
+    for name in vectors.features:
+        of_feature = feature(name)
+        if of_feature.of_joints:
+            columns = vectors.columns_of([name])
+            deviation = vectors.X[-1][:, columns].std(axis=0)
+            ends = np.arange(1, len(columns) + 1) % max(of_feature.samples, 1) == 0
+            telling[columns] = ends & (deviation >= MOVED_SHARE * deviation.max())
+    return telling
+
+
+def _scale(
+    x: Floats, widths: Sequence[int], telling: Booleans
+) -> tuple[Floats, Floats]:
+    """Mean (p,) of each column of x (n, p), and its steps a unit (p,): 0 of those that
+    do not count."""
     mean = _in_float32(x.mean(axis=0))
     deviation = x.std(axis=0)
     columns = np.array(widths, dtype=np.int64)
@@ -181,7 +217,7 @@ def _scale(x: Floats, widths: Sequence[int]) -> tuple[Floats, Floats]:
     smallest = LEAST_SHARE * np.repeat(np.sqrt(squares), columns)
     deviation = np.maximum(deviation, smallest)
     # The spread of a constant column is the rounding of its mean.
-    moves = deviation > 1e-9 * np.abs(mean)
+    moves = telling & (deviation > 1e-9 * np.abs(mean))
     gain = np.divide(2.0**STEP_BITS, deviation, out=np.zeros_like(mean), where=moves)
     return mean, _in_float32(gain)
 
@@ -284,6 +320,7 @@ def held_out_scores(
     folds: Integers,
     widths: Sequence[int],
     jobs: int = 1,
+    telling: Booleans | None = None,
 ) -> Scores:
     """The scores of trials (n,) by spaces without their fold.
 
@@ -293,9 +330,13 @@ def held_out_scores(
         folds: (n,) from 0; -1 for trials that are never left out, whose score is NaN.
         widths: columns of each feature type.
         jobs: processes.
+        telling: (p,) whether columns count; all do where None.
     """
     count = int(folds.max()) + 1
-    work = (delayed(_fold_scores)(X, labels, folds == k, widths) for k in range(count))
+    work = (
+        delayed(_fold_scores)(X, labels, folds == k, widths, telling)
+        for k in range(count)
+    )
     scores = np.full((2, *X.shape[:2]), np.nan)
     for k, of_fold in enumerate(Parallel(n_jobs=jobs)(work)):
         scores[:, :, folds == k] = of_fold
@@ -307,9 +348,10 @@ def _fold_scores(
     labels: Strings,
     left_out: Booleans,
     widths: Sequence[int],
+    telling: Booleans | None,
 ) -> Scores:
     with single_thread():
-        space = NoveltySpace.of(X[:, ~left_out], labels[~left_out], widths)
+        space = NoveltySpace.of(X[:, ~left_out], labels[~left_out], widths, telling)
         return space.scores(X[:, left_out])
 
 

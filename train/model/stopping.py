@@ -58,9 +58,11 @@ from train.model.novelty import (
     FOLDS,
     UNUSUAL_RATE,
     NoveltySpace,
+    Scores,
     beyond,
     held_out_scores,
     limits_of,
+    telling_columns,
 )
 from train.model.pipeline import Choices, ContactClassifier
 from train.model.rules import RISK, Course, agreeing, candidates, certify
@@ -119,6 +121,8 @@ class SequentialClassifier:
         jobs: processes.
         widths: columns of each feature type; equal where None.
         early: settings of early decision points; those of the full window where None.
+        drawn: whether a scene drew the trained things, so that the model is for other
+            arms than the scene's.
 
     Attributes:
         decision_points_: a fitted `ContactClassifier` for each decision point.
@@ -137,6 +141,7 @@ class SequentialClassifier:
     jobs: int = 1
     widths: Sequence[int] | None = None
     early: Early | None = None
+    drawn: bool = False
 
     def fit(
         self,
@@ -221,16 +226,17 @@ class SequentialClassifier:
         names = self.choices.keys() - kinds or self.choices.keys()
         self._name = finest({task: vectors.y[task] for task in names})
         labels = vectors.y[self._name]
+        telling = telling_columns(vectors) if self.drawn else None
         with single_thread():
-            self.space_ = NoveltySpace.of(vectors.X, labels, vectors.columns)
+            self.space_ = NoveltySpace.of(vectors.X, labels, vectors.columns, telling)
         novelty_folds = np.where(folds >= 0, stratified_folds(labels, FOLDS), -1)
-        scores = held_out_scores(
-            vectors.X,
-            labels,
-            novelty_folds,
-            vectors.columns,
-            self.jobs,
-        )
+
+        def scores_without(folds: Integers) -> Scores:
+            return held_out_scores(
+                vectors.X, labels, folds, vectors.columns, self.jobs, telling
+            )
+
+        scores = scores_without(novelty_folds)
         # A copy of another trial says nothing of how far new ones lie.
         counted = scores.novelty.min(axis=0) > 0.0
         if counted.sum() < FEWEST:
@@ -241,13 +247,7 @@ class SequentialClassifier:
         self._things = thing_folds(np.where(folds >= 0, labels, ""))
         left_out = None
         if self._things is not None:
-            self._left_out = held_out_scores(
-                vectors.X,
-                labels,
-                self._things,
-                vectors.columns,
-                self.jobs,
-            )
+            self._left_out = scores_without(self._things)
             left_out = self._left_out.part(self._things >= 0).remoteness
         self._bare = remoteness_of(tested.remoteness, left_out)
         self._known = known_of(self._bare, scores.remoteness)

@@ -148,7 +148,8 @@ def _step_line(step_s: float, measured: Convergence, scene: Scene) -> str:
     if not measured.within:
         verdict = f"no step is within {goal}, and {best} errs by {100.0 * measured.error:.2g} %"
     return (
-        f"  step {1e3 * step_s:g} ms errs by {100.0 * measured.error_as_given:.2g} % "
-        f"beside the reference run; by extrapolation, {verdict} (error {errors}; order "
-        f"{measured.order:.2g}; reference run at {1e3 * measured.steps_s[-1]:.2g} ms)"
+        f"  step {1e3 * step_s:g} ms errs by {100.0 * measured.error_as_given:.2g} %; "
+        f"{verdict} (error {errors}; beside a reference run at "
+        f"{1e3 * measured.steps_s[-1]:.2g} ms, which the last halving of its step "
+        f"changed by {100.0 * measured.change:.2g} %)"
     )

@@ -1,12 +1,10 @@
-"""Measures the step that a scene's trials need.
-
-The step is halved until another halving changes the force little.
-"""
+"""Measures the step that a scene's trials need, beside a reference run whose step is
+halved until another halving changes the force little."""
 
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from itertools import pairwise, product
+from itertools import product
 
 import numpy as np
 
@@ -26,9 +24,6 @@ MOST_OBJECTS = 8
 """Most objects of a kind whose steps are measured; they are spread over its list."""
 MOST_STEPS = 20_000
 """Most steps of a trial of the reference run."""
-REFERENCE_PART = 0.5
-"""Step of the reference run, as a part of the shortest step tried; a swing may need
-less."""
 LITTLE_GAIN = 2.0
 """Largest error of the step chosen where no step is within the tolerance, in smallest
 errors."""
@@ -42,9 +37,9 @@ class Convergence:
         steps_s: the steps tried, each half of the one before, then the step of the
             reference run.
         errors: the error of each step but the last, as a part of the peak force: root
-            mean square over time of the force's distance from the reference run, or
-            from the extrapolated limit where that is larger; of the worst trial.
-        order: the error is about proportional to the step to this power.
+            mean square over time of the force's distance from the reference run; of the
+            worst trial.
+        change: the same of the reference run's distance from one of twice its step.
         step_s: the largest step whose error is within the scene's tolerance. Where none
             is, as where an object bounces differently at each step, the largest step
             whose error is at most `LITTLE_GAIN` times the smallest.
@@ -56,7 +51,7 @@ class Convergence:
 
     steps_s: tuple[float, ...]
     errors: tuple[float, ...]
-    order: float
+    change: float
     step_s: float
     error: float
     within: bool
@@ -113,14 +108,9 @@ class _Kind:
     steps_s: list[float] = field(default_factory=list)
     forces: list[Array] = field(default_factory=list)
 
-    def changes(self) -> list[float]:
-        """How far each step's force lies from that of the next."""
-        return list(map(_distance, self.forces, self.forces[1:]))
-
-    def errors(self) -> list[float]:
-        """The extrapolated error of each step but the last."""
-        changes = self.changes()
-        return [change / (1.0 - 2.0 ** -_order(changes)) for change in changes]
+    def change(self) -> float:
+        """How far the last step's force lies from that of the one before."""
+        return _distance(*self.forces[-2:])
 
 
 def measure(
@@ -129,11 +119,9 @@ def measure(
     """The error of each step on middle trials of each kind, one for each of its
     objects.
 
-    The differences between neighbouring steps give the order p and, summed as a
-    geometric series, the error of each step (Richardson). Where even the shortest step
-    is too long to resolve how a light object swings, its halves agree and are all
-    wrong; so the forces are also compared with those of a reference run that resolves
-    the swing. Trials end with the window in which labels are judged.
+    Where even the shortest step is too long to resolve how a light object swings, its
+    halves agree and are all wrong; so the reference run resolves the swing. Trials end
+    with the window in which labels are judged.
     """
     after_s = min(scene.trials["after_s"], scene.labels["window_s"])
     scene = replace(
@@ -148,20 +136,38 @@ def measure(
     kinds = [_Kind(_spread_out(specs)) for specs in trials_by_kind.values()]
     first_steps = [frame_s / 2**k for k in range(FIRST_HALVINGS + 1)]
     _run(scene, list(product(kinds, first_steps)))
-    rough = [kind for kind in kinds if not kind.errors()[-2] <= tolerance]
+    rough = [kind for kind in kinds if not kind.change() <= tolerance]
     _run(scene, [(kind, frame_s / 2**HALVINGS) for kind in rough])
-    shortest = (scene.lead.high + after_s) / MOST_STEPS
-    reference = [
-        (kind, max(min(swing_s, kind.steps_s[-1] * REFERENCE_PART), shortest))
-        for kind, swing_s in zip(kinds, _swing_steps(scene, kinds), strict=True)
-    ]
-    _run(scene, reference, paced=False)
+    references = _references(scene, kinds, tolerance)
     as_given = [_Kind(kind.specs) for kind in kinds]
     _run(scene, [(kind, kind.specs[0].step_s) for kind in as_given])
     return {
-        effects: _judged(kind, at_step.forces[0], tolerance)
-        for effects, kind, at_step in zip(trials_by_kind, kinds, as_given, strict=True)
+        effects: _judged(kind, reference, at_step.forces[0], tolerance)
+        for effects, kind, reference, at_step in zip(
+            trials_by_kind, kinds, references, as_given, strict=True
+        )
     }
+
+
+def _references(scene: Scene, kinds: Sequence[_Kind], tolerance: float) -> list[_Kind]:
+    """Runs of the kinds at halved steps, from the shortest tried or that which resolves
+    a swing, until a halving is within the tolerance or the trials have `MOST_STEPS`."""
+    shortest = scene.frame_count / scene.rate_hz / MOST_STEPS
+    references = []
+    work = []
+    for kind, swing_s in zip(kinds, _swing_steps(scene, list(kinds)), strict=True):
+        reference = _Kind(kind.specs, kind.steps_s[-1:], kind.forces[-1:])
+        references.append(reference)
+        step_s = min(swing_s, 0.5 * kind.steps_s[-1])
+        work.append((reference, max(step_s, shortest)))
+    while work:
+        _run(scene, work, paced=False)
+        work = [
+            (reference, 0.5 * reference.steps_s[-1])
+            for reference, step_s in work
+            if reference.change() > tolerance and step_s >= 2.0 * shortest
+        ]
+    return references
 
 
 def _spread_out(specs: Sequence[TrialSpec]) -> list[TrialSpec]:
@@ -201,21 +207,21 @@ def _by_kind(values: Array, kinds: list[_Kind]) -> list[Array]:
     return np.split(values, np.cumsum([len(kind.specs) for kind in kinds])[:-1])
 
 
-def _judged(kind: _Kind, force_as_given: Array, tolerance: float) -> Convergence:
-    reference = kind.forces.pop()
-    error_as_given = _distance(force_as_given, reference)
-    distances = [_distance(force, reference) for force in kind.forces]
-    errors = (*map(max, distances, kind.errors()), distances[-1])
+def _judged(
+    kind: _Kind, reference: _Kind, force_as_given: Array, tolerance: float
+) -> Convergence:
+    limit_force = reference.forces[-1]
+    error_as_given = _distance(force_as_given, limit_force)
+    errors = tuple(_distance(force, limit_force) for force in kind.forces)
     smallest = min(errors)
     limit = tolerance if smallest <= tolerance else LITTLE_GAIN * smallest
     step_s, error = next(
-        (s, e) for s, e in zip(kind.steps_s, errors, strict=False) if e <= limit
+        (s, e) for s, e in zip(kind.steps_s, errors, strict=True) if e <= limit
     )
-    order = _order(kind.changes())
     return Convergence(
-        tuple(kind.steps_s),
+        (*kind.steps_s, reference.steps_s[-1]),
         errors,
-        order,
+        reference.change(),
         step_s,
         error,
         error <= tolerance,
@@ -229,13 +235,6 @@ def _distance(forces: Array, reference: Array) -> float:
     peak = reference.max(axis=1)
     change = np.sqrt(np.mean((forces - reference) ** 2, axis=1))
     return float(np.max(change / np.where(peak > 0.0, peak, 1.0)))
-
-
-def _order(changes: list[float]) -> float:
-    """log2 of the factor by which a halving shrinks the change: the smaller of the last
-    two, from 0.25 to 1, the order of an implicit Euler step."""
-    factors = [a / b for a, b in pairwise(changes[-3:]) if b > 0.0]
-    return float(np.clip(math.log2(max(min(factors, default=2.0), 1e-9)), 0.25, 1.0))
 
 
 def _swing_steps(scene: Scene, kinds: list[_Kind]) -> list[float]:

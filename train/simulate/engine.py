@@ -78,8 +78,7 @@ def _values(scene: Scene, trials: list[TrialSpec]) -> dict[str, Any]:
     numbers = np.array([trial.number for trial in trials])
     values = {
         **first.object.values,
-        "lead_s": scene.lead,
-        "taxel_n_m": scene.taxel_n_m,
+        **scene.values,
         **PLACED,
     }
     suffix = f".{first.attempt}" if first.attempt else ""

@@ -9,11 +9,11 @@ import numpy as np
 from train.simulate import schema
 from train.simulate.contact import GRAVITY
 from train.simulate.scene_model import Cylinder, SceneTable, Value
-from train.simulate.schema import OBJECT, Field
+from train.simulate.schema import OBJECT
 from train.simulate.streams import stream
 
-PART = Field(0.0, 1.0, 1.0)
-"""friction_kinetic as a part of friction_static."""
+PART = Value(0.8, 0.95)
+"""friction_kinetic as a part of friction_static [measured]."""
 DRAWS = 1000
 PRESSED_M = 0.06
 """How deep the forearm presses a soft object early enough to move it within the window
@@ -30,9 +30,9 @@ def draw_family(
 
     Each object draws every range of the family once, uniformly in its logarithm
     (uniformly where the range begins at 0), from a stream of the family's name.
-    `kinetic_part` gives `friction_kinetic`. An object that may be movable is drawn
-    again until `push_n` newtons, or the force that it passes on to its foot if that is
-    less, move it. A family may give its own `push_n`.
+    `friction_kinetic` is drawn as a part of `friction_static`. An object that may be
+    movable is drawn again until `push_n` newtons, or the force that it passes on to its
+    foot if that is less, move it.
 
     Raises:
         InputError: a key is missing, a range makes no sense, or nothing in it can be
@@ -42,10 +42,8 @@ def draw_family(
     family = table.choice("family", tuple(schema.FAMILIES))
     conditions = table.names("conditions", schema.CONDITIONS)
     count = table.whole("count", allowed=range(1, 1001))
-    part = table.value("kinetic_part", PART, [0.8, 0.95])
-    push_n = table.field("push_n", schema.LABELS["push_n"], push_n)
     defaults = schema.keys_of(family)
-    del defaults["friction_kinetic"]  # which kinetic_part gives
+    del defaults["friction_kinetic"]  # which PART gives
     keys = set(filter(table.has, defaults))
     table.refuse_unknown()
     # The draws follow the order of the file.
@@ -55,7 +53,7 @@ def draw_family(
     generator = stream(seed, "family", name)
     for number in range(count):
         for _ in range(DRAWS):
-            values = _draw_object(generator, ranges, part)
+            values = _draw_object(generator, ranges)
             if not movable or _moves({**usual, **values}, push_n, skin):
                 break
         else:
@@ -72,7 +70,6 @@ def draw_family(
 def _draw_object(
     generator: np.random.Generator,
     ranges: Mapping[str, Value],
-    part: Value,
 ) -> dict[str, float]:
     """The values of an object, those that count something rounded, with its kinetic
     friction as a part of the static."""
@@ -81,7 +78,7 @@ def _draw_object(
         number = _draw(generator, value)
         values[key] = round(number) if OBJECT[key].integer else number
     if "friction_static" in values:
-        kinetic = values["friction_static"] * _draw(generator, part)
+        kinetic = values["friction_static"] * _draw(generator, PART)
         values["friction_kinetic"] = kinetic
     return values
 

@@ -156,7 +156,7 @@ def required_effects(scene: Scene, item: SceneObject, condition: str) -> dict[st
     for name, info in EFFECTS.items():
         reason = _reason(scene, item, condition, name)
         # An effect stands behind those that it needs.
-        if reason and name not in scene.leave_out and required.keys() >= {*info.needs}:
+        if reason and required.keys() >= {*info.needs}:
             required[name] = reason
     return required
 
@@ -192,7 +192,6 @@ def check_supported(scene: Scene, where: str) -> None:
     Raises:
         InputError: an effect suits none; the sentence names the object that it needs.
     """
-    _check_left_out(scene, where)
     check_heeded(scene, where)
     required = {
         effect
@@ -210,19 +209,6 @@ def check_supported(scene: Scene, where: str) -> None:
                 f"{where}: effects.add names {name}, which this scene cannot support: "
                 f"it needs {', '.join(_needs(name))}"
             )
-
-
-def _check_left_out(scene: Scene, where: str) -> None:
-    """Refuse to leave out an effect that makes an object what its label says."""
-    for name in scene.leave_out:
-        for item in scene.objects:
-            yields = name in FAMILIES[item.family].effects[:1]
-            if yields or EFFECTS[name].condition in item.conditions:
-                raise InputError(
-                    f"{where}: effects.leave_out leaves out {name}, without which "
-                    f"object {item.name!r} would not be "
-                    f"{'soft' if yields else 'movable'}, as its label says"
-                )
 
 
 def _needs(name: str) -> list[str]:
@@ -247,7 +233,7 @@ def check_heeded(scene: Scene, where: str) -> None:
         InputError: the sentence names the key.
     """
     for item in scene.objects:
-        heeded: set[str] = set(scene.leave_out)
+        heeded: set[str] = set()
         for condition in item.conditions:
             heeded |= required_effects(scene, item, condition).keys()
         for name, info in EFFECTS.items():

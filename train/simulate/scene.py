@@ -368,6 +368,8 @@ def _check_needs(table: SceneTable, movable: bool) -> None:
         keys += ["mass_kg", "friction_static", "friction_kinetic"]
     if table.has("base_m") or table.has("height_m"):
         keys += ["base_m", "height_m"]
+    if table.has("cover_spread"):
+        keys.append("cover_n_m")
     for key in keys:
         table.get(key)
 
@@ -383,7 +385,6 @@ def _check_friction(table: SceneTable, values: Mapping[str, Value]) -> None:
 
 def _effects(table: SceneTable) -> dict[str, Any]:
     add = table.names("add", tuple(EFFECTS))
-    leave_out = table.names("leave_out", tuple(EFFECTS))
     settings = {
         name: table.table(name).fields(info.settings)
         for name, info in EFFECTS.items()
@@ -391,6 +392,4 @@ def _effects(table: SceneTable) -> dict[str, Any]:
     }
     table.refuse_unknown()
     add = (*add, *(name for name in settings if name not in add))
-    for name in set(add) & set(leave_out):
-        raise table.fail("leave_out", f"a list without {name}, which effects.add adds")
-    return {"add": add, "leave_out": leave_out, "settings": settings}
+    return {"add": add, "settings": settings}

@@ -167,7 +167,6 @@ class Scene:
     """When and by how much an object must do as its label says."""
     objects: tuple[SceneObject, ...]
     add: tuple[str, ...]
-    leave_out: tuple[str, ...]
     settings: dict[str, dict[str, float]] = field(default_factory=dict)
 
     @cached_property
@@ -179,6 +178,14 @@ class Scene:
     def kinds(self) -> list[tuple[SceneObject, str]]:
         """Each object in each of its conditions."""
         return [(item, c) for item in self.objects for c in item.conditions]
+
+    @property
+    def values(self) -> dict[str, Value]:
+        """{name: value} of trials with any object."""
+        values = {"lead_s": self.lead, "taxel_n_m": self.taxel_n_m}
+        if self.spread.get("travel_s"):
+            values["travel_s"] = Value(self.travel_s, self.travel_s)
+        return values
 
     @property
     def rate_hz(self) -> float:

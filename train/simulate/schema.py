@@ -78,6 +78,7 @@ SPREAD = {
     "friction": Field(0.0, 1.0, 0.0),
     "mass": Field(0.0, 1.0, 0.0),  # as a part of its value
     "cover": Field(0.0, 1.0, 0.0),  # of the skin's and the cover's stiffness, as a part
+    "travel_s": Field(0.0, 10.0, 0.0),  # time at which the arm halts
 }
 SPREAD_OF_MOVABLE = {"slope_deg": "mass_kg", "aside_m": "foot_m"}
 """{spread around 0: the other key that a movable object needs for it}; the object need
@@ -109,6 +110,8 @@ OBJECT = {
     # of the logarithm of the stems' stiffnesses
     "stem_deviation": Field(0.0, 2.0, 0.3),
     "stem_kg": above_0(10.0, 0.02),  # moving mass of a stem
+    # of the forearm's middle above the feet of stems that stand upright
+    "stem_height_m": Field(0.2, 10.0),
     "bubble_n_m": above_0(1e12, 2000.0),  # stiffness of a bubble at rest
     "bubble_m": above_0(0.1, 0.004),  # height of a bubble
     "pop_n": above_0(1e6, 10.0),  # force at which a bubble bursts
@@ -172,6 +175,7 @@ EFFECTS: dict[str, Effect] = {
     "cover": Effect("contact", keys=("cover_n_m",)),
     "pop": Effect("contact", families=("bubbles",)),
     "stems": Effect("contact", families=("foliage",)),
+    "upright": Effect("contact", needs=("stems",), keys=("stem_height_m",)),
     "tilt": Effect("contact", families=("rigid", "foam", "pillow", "bubbles")),
     "relaxation": Effect("contact", families=ELASTIC),
     # loss_s: dashpot by stiffness
@@ -209,6 +213,6 @@ EFFECTS: dict[str, Effect] = {
     # part: of all frames
     "dropped_frames": Effect("clock", {"part": Field(0.0, 0.9, 0.02)}),
 }
-STEP = Field(1e-6, 1.0)  # the physics' step
+STEP = Field(1e-5, 1.0)  # the physics' step
 SHARED = {"viscous": ("relaxation", "inertia")}
 """{module of `effects`: the effects that share it}."""

@@ -22,8 +22,8 @@ REDRAWS = 40
 """Draws of one trial after which the scene is refused, if each contradicts the
 label."""
 AHEAD = 4
-"""Further draws of a trial simulated side by side; the first that fits its label is
-taken."""
+"""Further draws of a trial simulated side by side, for each that it has had; the first
+that fits its label is taken."""
 
 
 @dataclass(frozen=True)
@@ -143,5 +143,5 @@ def _next_draws(
             f"{scene.labels['window_s']:g} s of the touch (the last {wrong.course}); "
             f"{wrong.remedy}"
         )
-    for attempt in range(first, min(first + AHEAD, REDRAWS)):
+    for attempt in range(first, min(first + AHEAD * first, REDRAWS)):
         yield replace(last, attempt=attempt)

@@ -7,6 +7,7 @@ import pytest
 
 from tests.hard_cases import exact
 from train.data.folds import stratified_folds
+from train.data.vectors import Vectors
 from train.model.novelty import (
     CLIP,
     FARTHEST,
@@ -16,6 +17,7 @@ from train.model.novelty import (
     NoveltySpace,
     held_out_scores,
     limits_of,
+    telling_columns,
 )
 
 WIDTHS = (20, 10)
@@ -132,6 +134,23 @@ def test_a_column_that_never_changed_counts_little_and_a_feature_not_at_all():
     space = NoveltySpace.of(X, labels, WIDTHS)
     assert 0.0 < space.points[0].gain[3] < np.inf
     assert (space.points[0].gain[20:] == 0.0).all()
+
+
+def test_of_a_drawn_scene_joints_count_by_how_far_those_that_move_have_moved():
+    rng = np.random.default_rng(3)
+    ways = rng.normal(size=(1, 40, 3)) * [1.0, 0.3, 0.01]
+    courses = ways[..., None] * np.linspace(0.1, 1.0, 10)
+    X = np.concatenate([rng.normal(size=(1, 40, 5)), courses.reshape(1, 40, 30)], -1)
+    names = ("log_max_force@5", "joint_change@10")
+    telling = telling_columns(Vectors(X, {}, names, (5, 30)))
+    assert np.flatnonzero(telling).tolist() == [0, 1, 2, 3, 4, 14, 24]
+    labels = np.array(list("ab"))[np.arange(40) % 2]
+    space = NoveltySpace.of(X, labels, (5, 30), telling)
+    moved = X.copy()
+    moved[..., 25:] += 1.0
+    assert space.scores(moved).novelty.tolist() == space.scores(X).novelty.tolist()
+    moved[..., 14] += 5.0
+    assert (space.scores(moved).novelty > space.scores(X).novelty).mean() > 0.9
 
 
 def test_held_out_scores_do_not_depend_on_the_held_out_trials():

@@ -12,11 +12,12 @@ from train.simulate.engine import run_physics
 
 def test_halving_the_step_halves_the_error():
     scene = make(movable(1.0, 0.4, 0.35, width_m=0.05))
-    scene.trials["tolerance"] = 1e-9
+    scene.trials["tolerance"] = 5e-4
     (convergence,) = measure(scene, kinds(scene)).values()
-    assert convergence.errors[-1] < convergence.errors[0]
-    assert 0.6 <= convergence.order <= 1.0
+    assert convergence.errors[-1] < 0.7 * convergence.errors[-2]
     assert convergence.errors[-1] < 0.005
+    # So the reference run errs by about as much as its last halving changed.
+    assert convergence.change <= 5e-4
 
 
 @pytest.mark.slow

@@ -16,9 +16,10 @@ from tests.train.simulate.scenes import make, one_object, run, scene, specs_of
 from train.simulate import engine
 from train.simulate.convergence import kinds
 from train.simulate.plan import Call, make_plan
-from train.simulate.schema import EFFECTS, FAMILIES
+from train.simulate.schema import EFFECTS
 
 RANGES = {
+    "stem_height_m": [0.3, 0.6],
     "mass_kg": [0.02, 1.0],
     "friction_static": [0.5, 1.1],
     "friction_kinetic": [0.1, 0.5],
@@ -146,8 +147,8 @@ def lean(t, mover):
 
 
 def pair_scene(first, second):
-    """A scene whose object calls for two effects and for nothing that they do not need;
-    None where no object can have both."""
+    """A scene whose object calls for two effects, and for nothing that neither they nor
+    its family need; None where no object can have both."""
     pair = {first, second, *EFFECTS[first].needs, *EFFECTS[second].needs}
     families = [set(EFFECTS[n].families) for n in pair if EFFECTS[n].families]
     common = sorted(set.intersection(*families or [{"rigid"}]))
@@ -158,15 +159,11 @@ def pair_scene(first, second):
     family = common[0]
     condition = "movable" if "sliding" in pair else "fixed"
     thing = {"name": "thing", "family": family, "conditions": [condition], **keys}
-    family_effects = set(FAMILIES[family].effects[1:])
     trial_scene = scene(
         [{**thing, **OWN_RANGES.get(family, {})}],
         trials={"count": 6, "lead_s": 0.1, "after_s": 0.7},
         spread={"place_m": 0.02, "yaw_deg": 3.0},
-        effects={
-            "add": sorted(pair - {"shear"}),
-            "leave_out": sorted(family_effects - pair),
-        },
+        effects={"add": sorted(pair - {"shear"})},
         skin={"axes": 3 if "shear" in pair else 1},
     )
     assert pair <= set(next(iter(kinds(trial_scene)))), pair

@@ -8,7 +8,7 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 from edge.recording import load
-from tests.train.simulate.scenes import make, one_object, scene
+from tests.train.simulate.scenes import make, one_object, run, scene
 from train.__main__ import main
 from train.simulate import scene as scenes
 from train.simulate.run import batches_of, simulate, write
@@ -36,6 +36,18 @@ def written(demo, tmp_path_factory):
 @pytest.fixture(scope="module")
 def trial(written):
     return load(written[0] / "cardboard-box-movable-01.npz")
+
+
+def test_arms_may_halt_at_different_times_once_they_push():
+    trial_scene = scene(
+        one_object(), spread={"travel_s": 1.0}, motion={"travel_s": 1.0}
+    )
+    trials = run(trial_scene).trials
+    halts = trials.arm.travel_s[0]
+    assert len(set(halts.tolist())) == trials.n
+    assert (halts >= trials.values["lead_s"] + 0.2).all()
+    later = trials.everyone.equilibrium(halts + 1.0)
+    assert (later == trials.everyone.equilibrium(halts)).all()
 
 
 def test_a_recordings_metadata_are_as_the_contract_says(demo, trial):
@@ -167,7 +179,7 @@ class TestCommand:
         line = next(x for x in out.splitlines() if "lateral" in x)
         assert "family foam" in line
         assert float(line.split()[1]) > 0.0
-        assert "order" in out
+        assert "the last halving of its step" in out
         assert "1 trials, simulated side by side in" in out
         assert "not called for, and not loaded: cover, pop" in err
 

@@ -268,6 +268,47 @@ def test_the_stems_that_are_held_bear_by_their_own_bends():
     assert_allclose(measured, middle, atol=0.01)
 
 
+def upright(**keys):
+    plant = {"family": "foliage", "stem_slip_m": 1.0, "stem_spread_m": 0.0}
+    return press(**{**plant, "stem_height_m": 0.3, **keys})
+
+
+def test_upright_stems_are_lines_beside_a_cylinder():
+    batch = upright(stem_count=40, breadth_m=0.2)
+    trials = batch.trials
+    stems = trials.states["stems"]
+    met = stems.stiffness > 0.0
+    # Those farther to the side than the radius miss: all but 92 of 200 mm.
+    assert 0.3 < met.mean() < 0.6
+    column = (stems.taxel % len(trials.bed.columns))[met]
+    angle = trials.bed.column_angle[column, np.nonzero(met)[1]]
+    # The first that is met stands nearly in the middle; others follow by R (1 - cos),
+    # to within the columns' pitch of 15 degrees.
+    assert stems.depth[met].min() == 0.0
+    assert_allclose(stems.depth[met], RADIUS * (1.0 - np.cos(angle)), atol=0.007)
+    assert "upright" in trials.plan.calls
+    pressed = (batch.counts > 0).any(axis=1)
+    assert pressed[:, -1].any()
+    assert not pressed[:, :-1].any()
+
+
+def test_a_stem_is_stiffer_by_the_square_of_the_height_at_which_it_is_pushed():
+    middle = {"stem_count": 1, "breadth_m": 1e-6, "stem_deviation": 0.0}
+    low, high = (
+        upright(stem_height_m=height, **middle).trials for height in (0.3, 3.0)
+    )
+    scene = low.scene
+    below = scene.place_m - scene.skin.row_z[-1, 0]
+    for trials, height in ((low, 0.3), (high, 3.0)):
+        stiffness = trials.values["stem_n_m"] * (height / (height - below)) ** 2
+        assert_allclose(trials.states["stems"].stiffness[0], stiffness, rtol=1e-12)
+
+
+def test_one_stem_is_met_however_far_all_stand_to_the_side():
+    stems = upright(stem_count=1, breadth_m=10.0).trials.states["stems"]
+    assert (stems.stiffness > 0.0).all()
+
+
 def test_stems_that_have_slipped_off_damp_no_more():
     keys = {"stem_slip_m": 0.02, "stem_spread_m": 0.02, "stem_damping": 1.0}
     batch = press(family="foliage", **keys)

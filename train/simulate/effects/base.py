@@ -24,6 +24,8 @@ FLAT_M = 1e6
 """Radius of a flat face."""
 FAR_M = -1e9
 """Depth of a contact whose face covers no row."""
+PUSHES_S = 0.2
+"""Time for which an arm that may halt pushes on at least."""
 PRESSED_M = 0.002
 """Depth to which a swinging object is pressed: it swings on the springs met by then."""
 
@@ -44,7 +46,11 @@ def swing(t: Trials) -> None:
     moves = rate != 0.0
     reached = np.where(moves, way / np.where(moves, np.abs(rate), 1.0), np.inf)
     t.arm.start = start
-    t.arm.travel_s = np.minimum(t.scene.travel_s, reached)
+    travel_s = t.scene.travel_s
+    if "travel_s" in t.scene.values:
+        least = t.values["lead_s"] + PUSHES_S
+        travel_s = np.maximum(t.values["travel_s"], least)
+    t.arm.travel_s = np.minimum(travel_s, reached)
     t.arm.q = t.equilibrium(0.0) - t.joints.lag
 
 

@@ -19,6 +19,7 @@ class Stems(Group):
         depth, stiffness: (stems, n) metres at which each is touched, and newtons a
             metre, 0 once it has slipped off.
         damping: (stems, n) N s/m of each, 0 once it has slipped off.
+        along: (stems, n) where each stands within the face, from 0 to 1.
         taxel, part: (stems, n) the place in the window's image of the first of the two
             rows that a stem lies between, and the part of its load that the second
             bears.
@@ -30,6 +31,7 @@ class Stems(Group):
     depth: Array
     stiffness: Array
     damping: Array
+    along: Array
     taxel: Places
     part: Array
     order: Places
@@ -69,6 +71,7 @@ def lay(t: Trials) -> None:
         depth=depth * values["stem_spread_m"],
         stiffness=stiffness,
         damping=np.where(stiffness > 0.0, damping, 0.0),
+        along=along,
         taxel=(low * window + (window // 2 + around)).astype(np.intp),
         part=place - low,
         order=np.zeros(shape, dtype=np.intp),
