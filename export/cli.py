@@ -22,6 +22,7 @@ from edge.tools.slips import counts_text
 from edge.tools.trial_options import add_arm, open_arm
 from edge.touch import measures
 from edge.touch.features import SAMPLES, WINDOW_S
+from edge.touch.layout import LONGEST_RELEASE_S
 from edge.writing import check_writable
 from export.api import measure, save
 from train.choose.decision_points import MOST_TRIALS
@@ -39,7 +40,10 @@ from train.tradeoff import front as fronts
 FIXED = ("features", "projection", "scaling", "components", "k", "window", "tasks")
 """Options that would make another model than the one that a point was measured with."""
 FORWARDED = tuple(
-    "features projection scaling components k samples tasks leave_out threshold onset jobs".split()
+    (
+        "features projection scaling components k samples tasks leave_out threshold onset "
+        "release_s jobs"
+    ).split()
 )
 """Options that `fit` takes as they are."""
 DECISION_POINTS = "0.2:1.2:0.1"
@@ -144,6 +148,14 @@ def _add_choice(top: argparse.ArgumentParser) -> None:
     counts = within(int, 0, 65534)
     option("--threshold", type=counts, help="counts above which a taxel is in contact")
     option("--onset", type=counts, help="counts above which a contact begins")
+    option(
+        "--release",
+        dest="release_s",
+        metavar="SECONDS",
+        type=within(float, 0.01, LONGEST_RELEASE_S),
+        help="how long a contact may be away and go on (default: the skin's, or longer if "
+        "many touches are felt in pieces and that is much more accurate)",
+    )
 
 
 def _add_results(top: argparse.ArgumentParser) -> None:
