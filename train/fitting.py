@@ -111,7 +111,7 @@ def fit(data: DataSet | str | Path | Sequence[str | Path], **options: Any) -> Fi
             less often, if the number of trials and the size of the model allow it.
         threshold: counts above which a taxel is in contact.
         onset: counts above which a contact begins.
-        release_s: seconds that a contact may be away and go on. Where None they are the
+        release: seconds that a contact may be away and go on. Where None they are the
             skin's, or more where that is more accurate (`train.data.pieces.joined`).
         arm: for recordings with joint angles that name no arm.
         quick: fewer candidates and folds.

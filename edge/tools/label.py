@@ -219,8 +219,7 @@ def changed(
     """
     if meta.get("contacts") and (labels or without):
         raise InputError(
-            f"{name}: its contacts have labels of their own; `python -m train split` "
-            "makes a recording of each"
+            f"{name}: its contacts have labels of their own; change meta.contacts"
         )
     after = {**meta.get("labels", {}), **labels}
     return {task: after[task] for task in after if task not in without}

@@ -32,7 +32,7 @@ class FitOptions(Fixed):
     decision_points_s: Sequence[float] | None = None
     threshold: int | None = None
     onset: int | None = None
-    release_s: float | None = None
+    release: float | None = None
     arm: Chain | None = None
     quick: bool = False
     jobs: int | None = None
@@ -128,7 +128,7 @@ def trials_of(
     def by(
         threshold: int | None,
         onset: int | None,
-        release_s: float | None = options.release_s,
+        release_s: float | None = options.release,
     ) -> DataSet:
         return load_trials(
             recordings,
@@ -152,7 +152,7 @@ def trials_of(
         if not any("simulation" in r.meta for r in recordings.recordings):
             dataset, lower = thresholds.chosen(dataset, by, accuracy)
             notes += lower
-    if options.release_s is None:
+    if options.release is None:
         layout = dataset.layout
         longer = partial(by, layout.threshold_counts, layout.onset)
         dataset, across = pieces.joined(dataset, longer, accuracy)

@@ -174,8 +174,7 @@ def _left_out(dataset: DataSet) -> Iterator[str]:
     if dataset.unused:
         yield (
             "warning: only the first of several contacts is used in "
-            f"{_files(dataset.unused)}; `python -m train split` makes a recording of "
-            "each contact"
+            f'{_files(dataset.unused)}; with meta.contacts of "alike" each is a trial'
         )
 
 

@@ -75,7 +75,7 @@ def test_contacts_end_as_ever_where_the_first_piece_tells_as_much(saved):
 
 
 def test_a_release_that_is_asked_for_is_kept(saved):
-    fitted = train.fit(saved(), release_s=0.5, **GIVEN)
+    fitted = train.fit(saved(), release=0.5, **GIVEN)
     assert fitted.dataset.layout.release_s == 0.5
     assert len(fitted.dataset.unused) == 12
 
