@@ -88,8 +88,7 @@ def test_fixed_values_and_some_tasks(recordings, tmp_path):
     assert task.projection == "pca"
     assert task.features == info.features
     assert info.window_s == 0.8
-    assert info.layout.threshold_counts == 120
-    assert info.layout.release_s == 2.0
+    assert (info.layout.threshold_counts, info.layout.release_s) == (120, 2.0)
 
 
 @pytest.mark.parametrize(

@@ -38,8 +38,8 @@ from train.model.stopping import Early
 from train.progress import bar
 
 FEW_TRIALS = 100
-"""With fewer trials the most accurate candidate is taken, whatever its price; with 140
-that gains less, and a dearer model takes longer to fit."""
+"""With fewer trials the candidate with the best grades is taken, whatever its price; with
+140 that gains less, and a dearer model takes longer to fit."""
 UNSEEN_SHRINKAGE = 0.1
 """Smallest shrinkage tried where entire groups are left out. Less shrinkage relies on
 differences that are small beside the features' spread, which do not carry over to new
@@ -123,7 +123,8 @@ class Choosing:
         folds = self._divisions.folds
         further_folds = self._divisions.further
         grouped = [task for task in self._y if self._is_grouped(task)]
-        by_trial = for_tasks(candidates, {*self._y}.difference(grouped))
+        alone = {*self._y}.difference(grouped)
+        by_trial = for_tasks(candidates, alone, graded=self._is_few and nested)
         total = fits(folds, nested)
         total += sum(fits(division, False) for division in further_folds)
         if self._groups is not None:
@@ -338,15 +339,16 @@ def _grouped_tasks(groups: Groups, y: Labels) -> frozenset[str]:
 
 
 def for_tasks(
-    candidates: Sequence[Candidate], tasks: Collection[str]
+    candidates: Sequence[Candidate], tasks: Collection[str], *, graded: bool = False
 ) -> list[SearchGrid]:
-    """The grids that are for some of the tasks, as candidates for these alone."""
+    """The grids that are for some of the tasks, as candidates for these alone, whose
+    answers are `graded` or not."""
     limited = []
     for candidate in candidates:
         for grid in candidate.grids:
             served = tuple(task for task in sorted(tasks) if grid.is_for(task))
             if served:
-                limited.append(replace(grid, tasks=served))
+                limited.append(replace(grid, tasks=served, graded=graded))
     return limited
 
 

