@@ -93,8 +93,7 @@ class Choosing:
         self._jobs = jobs
         self._progress = progress
         self._widths = dict(zip(dataset.names, dataset.widths(samples), strict=True))
-        is_few = len(divisions.folds) < FEW_TRIALS
-        self._is_few = is_few and bool(divisions.further)
+        self._is_few = len(divisions.folds) < FEW_TRIALS and bool(divisions.further)
         self._rule_of_groups = partial(rule_among, widths=self._widths)
         self._rule_of_trials = partial(self._rule_of_groups, is_few=self._is_few)
 
@@ -225,13 +224,17 @@ class Choosing:
     def choose(self, window_s: float) -> Settings:
         """Each task's settings."""
         vectors = self._vectors(window_s)
-        trials, groups = self._protocols(
-            *self._tables(vectors, self.candidates, "choosing", nested=True)
-        )
+        tables = self._tables(vectors, self.candidates, "choosing", nested=True)
+        trials = TrialsLeftOut(tables[0], self._widths, self._is_few)
+        groups = None
+        if self._groups is not None:
+            groups = GroupsLeftOut(tables[1], self._widths, groups=self._groups)
         chosen = {}
         of_task = {}
         for task in self._y:
-            protocol = self._protocol(task, trials, groups)
+            protocol = trials
+            if groups is not None and self._is_grouped(task):
+                protocol = groups
             chosen[task], of_task[task] = self._settle(task, protocol, trials)
         without = by_folds(of_task)
         plans: dict[str, Plan] = {TRIAL: (trials.folds, without)}
@@ -240,26 +243,6 @@ class Choosing:
             plans[groups.name] = groups.folds, by_folds(by_group)
         together = decided_together(chosen, vectors, plans, self._jobs)
         return Settings(together, trials.folds, without, self.candidates, window_s, [])
-
-    def _protocols(
-        self,
-        trials: AnswerTable,
-        groups: AnswerTable,
-    ) -> tuple[TrialsLeftOut, GroupsLeftOut | None]:
-        """What is left out, with the answers to it."""
-        by_trial = TrialsLeftOut(trials, self._widths, self._is_few)
-        if self._groups is None:
-            return by_trial, None
-        return by_trial, GroupsLeftOut(groups, self._widths, groups=self._groups)
-
-    def _protocol(
-        self,
-        task: str,
-        trials: TrialsLeftOut,
-        groups: GroupsLeftOut | None,
-    ) -> TrialsLeftOut:
-        """By what a task's settings are chosen."""
-        return groups if groups is not None and self._is_grouped(task) else trials
 
     def early(
         self,
@@ -314,6 +297,7 @@ class Choosing:
             candidates=tuple(best and promise(best[0]) for best in of_candidates),
             picks=tuple(best and best[1] for best in of_candidates),
             folds=protocol.folds,
+            agreed=protocol.agreed(task),
         )
         return chosen, without
 

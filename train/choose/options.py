@@ -11,7 +11,7 @@ from joblib import cpu_count
 from edge.errors import InputError
 from edge.touch.arm import Chain
 from edge.touch.features import SAMPLES
-from train.choose.candidates import Candidate, Fixed, candidates, features_of
+from train.choose.candidates import Fixed, candidates, features_of
 from train.choose.choose import Choosing
 from train.data import pieces, thresholds
 from train.data.contacts import Untouched
@@ -50,25 +50,6 @@ class FitOptions(Fixed):
             return self.decision_points_s[-1]
         return self.window_s
 
-    def candidates_for(
-        self,
-        dataset: DataSet,
-        y: Labels,
-        *,
-        drawn: bool,
-    ) -> list[Candidate]:
-        """The candidates for some trials."""
-        joints = dataset.joints > 0
-        shear = dataset.layout.axes is not None
-        return candidates(
-            y,
-            self,
-            joints=joints,
-            shear=shear,
-            drawn=drawn,
-            quick=self.quick,
-        )
-
     def choosing(self, dataset: DataSet, y: Labels, *, drawn: bool) -> Choosing:
         """The choice of the settings of some trials.
 
@@ -82,10 +63,18 @@ class FitOptions(Fixed):
                 f"k must be 1 to {most}, the trials that remain of "
                 f"{len(divisions.folds)} where some are left out, not {self.k}"
             )
+        tried = candidates(
+            y,
+            self,
+            joints=dataset.joints > 0,
+            shear=dataset.layout.axes is not None,
+            drawn=drawn,
+            quick=self.quick,
+        )
         return Choosing(
             dataset,
             y,
-            self.candidates_for(dataset, y, drawn=drawn),
+            tried,
             divisions,
             self.samples,
             self.processes,

@@ -6,6 +6,8 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
+import numpy as np
+
 from edge.arrays import Integers
 from train.choose.candidates import Candidate, costs, places_of
 from train.choose.evaluate import (
@@ -15,14 +17,17 @@ from train.choose.evaluate import (
     Result,
     chosen_by_fold,
     chosen_by_other_fold,
+    fold_numbers,
     nested_accuracy,
 )
 from train.choose.rule import Rule
+from train.data.folds import SEED
 from train.data.groups import TRIAL, Groups
 from train.data.labels import NO_CONTACT
 from train.data.vectors import Strings
 from train.model.pipeline import Choice
 
+HALVINGS = 20
 UNSEEN_MARGIN = 0.01
 """Accuracy on left-out groups within which the cheaper candidate is taken."""
 
@@ -104,6 +109,23 @@ class TrialsLeftOut:
     def accuracy(self, task: str) -> Result:
         """The nested accuracy of the choice."""
         return nested_accuracy(self.table, task, self.rule(task))
+
+    def agreed(self, task: str) -> int:
+        """In how many of `HALVINGS` divisions of the folds into two halves these choose
+        the same features and projection."""
+        answers = self.table.plain(task)
+        rule = self.rule(task)
+        numbers = fold_numbers(self.folds)
+        draw = np.random.default_rng(SEED)
+        agreed = 0
+        for _ in range(HALVINGS):
+            half = np.isin(self.folds, draw.permutation(numbers)[::2])
+            kinds = set()
+            for part in (half, ~half):
+                choice = self.table.choices[task][rule.choose(answers[:, part])]
+                kinds.add((choice.features, choice.projection))
+            agreed += len(kinds) == 1
+        return agreed
 
     def of_candidate(
         self, task: str, candidate: Candidate
