@@ -50,7 +50,6 @@ def saved(tmp_path):
 def test_a_contact_lasts_across_gaps_where_that_tells_more(saved, tmp_path):
     fitted = train.fit(saved(), **GIVEN)
     assert fitted.dataset.layout.release_s == 1.0
-    assert fitted.chosen["object"].accuracy.accuracy == 1.0
     (note,) = [note for note in fitted.notes if "across gaps" in note]
     assert "up to 1 s, as 12 of 12 touches are felt in pieces" in note
     assert "100.0% against" in note
@@ -77,7 +76,6 @@ def test_contacts_end_as_ever_where_the_first_piece_tells_as_much(saved):
 def test_a_release_that_is_asked_for_is_kept(saved):
     fitted = train.fit(saved(), release=0.5, **GIVEN)
     assert fitted.dataset.layout.release_s == 0.5
-    assert len(fitted.dataset.unused) == 12
 
 
 def test_nothing_is_tried_where_touches_are_whole(saved):
