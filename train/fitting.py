@@ -87,7 +87,7 @@ def fit(data: DataSet | str | Path | Sequence[str | Path], **options: Any) -> Fi
     Options you pass are held fixed. The others are chosen for each task among the
     candidates of `train.choose.choose`: the features and projection of the smallest model
     within one standard error of the best in cross-validation (the one whose
-    answers have the best grades where fewer than 100 single trials are left out, see
+    answers have the best grades where fewer than 200 single trials are left out, see
     `train.choose.answers`), with the scaling, shrinkage, components and k that are best
     there.
 

@@ -37,9 +37,6 @@ from train.model.pipeline import Choice, Choices
 from train.model.stopping import Early
 from train.progress import bar
 
-FEW_TRIALS = 100
-"""With fewer trials the candidate with the best grades is taken, whatever its price; with
-140 that gains less, and a dearer model takes longer to fit."""
 UNSEEN_SHRINKAGE = 0.1
 """Smallest shrinkage tried where entire groups are left out. Less shrinkage relies on
 differences that are small beside the features' spread, which do not carry over to new
@@ -93,7 +90,7 @@ class Choosing:
         self._jobs = jobs
         self._progress = progress
         self._widths = dict(zip(dataset.names, dataset.widths(samples), strict=True))
-        self._is_few = len(divisions.folds) < FEW_TRIALS and bool(divisions.further)
+        self._is_few = bool(divisions.further)
         self._rule_of_groups = partial(rule_among, widths=self._widths)
         self._rule_of_trials = partial(self._rule_of_groups, is_few=self._is_few)
 

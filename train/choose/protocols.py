@@ -43,7 +43,8 @@ def rule_among(
 
     Among few trials a standard error is wide, and the cheapest within it often less
     accurate: by 0 to 4 points on cuts of 54 trials of iCub, SDH-2 and simulated touches.
-    Their answers are graded then, which chooses better by another 0.8 +- 0.3 points.
+    Their answers are graded then, which chooses better by another point; on cuts of 120
+    trials both together by 1.3 points.
 
     Args:
         choices: of the candidates.
