@@ -115,15 +115,12 @@ def clearness(spaces: Sequence[Space], labels: Integers, answers: Integers) -> F
         answers: (m,) the right ones.
     """
     same = answers[:, None] == labels
-    clear = []
-    for training, tested in spaces:
-        squares = squared_distances(tested, training)
-        right = np.where(same, squares, np.inf).min(axis=1)
-        other = np.where(same, np.inf, squares).min(axis=1)
-        with np.errstate(invalid="ignore"):
-            doubt = np.nan_to_num(right / (right + other), nan=1.0)
-        clear.append(1.0 - doubt**2)
-    return np.stack(clear)
+    squares = np.stack([squared_distances(new, rows) for rows, new in spaces])
+    right = np.where(same, squares, np.inf).min(axis=2)
+    other = np.where(same, np.inf, squares).min(axis=2)
+    with np.errstate(invalid="ignore"):
+        doubt = np.nan_to_num(right / (right + other), nan=1.0)
+    return np.asarray(1.0 - doubt**2)
 
 
 def _squares(training: Floats, tested: Floats) -> Floats:
