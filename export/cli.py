@@ -38,13 +38,14 @@ from train.tradeoff import front as fronts
 
 FIXED = ("features", "projection", "scaling", "components", "k", "window", "tasks")
 """Options that would make another model than the one that a point was measured with."""
-FORWARDED = tuple(
-    "features projection scaling components k samples tasks leave_out threshold onset jobs".split()
-)
+FORWARDED = (
+    "features projection scaling components k samples tasks leave_out threshold onset "
+    "release jobs"
+).split()
 """Options that `fit` takes as they are."""
 DECISION_POINTS = "0.2:1.2:0.1"
 LONGEST_S = 60.0
-"""Longest window."""
+"""Longest window, and longest time that a contact may be away."""
 count = within(int, 1, 1_000_000)
 """The type of an option that takes a number of things."""
 
@@ -144,6 +145,12 @@ def _add_choice(top: argparse.ArgumentParser) -> None:
     counts = within(int, 0, 65534)
     option("--threshold", type=counts, help="counts above which a taxel is in contact")
     option("--onset", type=counts, help="counts above which a contact begins")
+    option(
+        "--release",
+        type=within(float, 0.01, LONGEST_S),
+        help="seconds that a contact may be away and go on (default: the skin's, or longer "
+        "if many touches are felt in pieces and that is much more accurate)",
+    )
 
 
 def _add_results(top: argparse.ArgumentParser) -> None:
@@ -294,8 +301,6 @@ def _fit(arguments: argparse.Namespace) -> Fitted:
         window_s = point.window_s
         quick = front.quick
     points = arguments.decision_points
-    if window_s is None and points not in (None, "none"):
-        window_s = WINDOW_S
     early = None
     if points is not None:
         early = parse_decision_points(points, window_s or WINDOW_S)

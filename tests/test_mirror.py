@@ -10,6 +10,7 @@ THROUGH = {
     "train/study": "train/study/test_study_report.py",
     "train/tradeoff": "train/tradeoff/test_tradeoff.py",
     "train/report/work.py": "train/study/test_study_report.py",
+    "train/data/contacts.py": "train/data/test_dataset.py",
     "train/importers/rosbag.py": "train/importers/test_log_importers.py",
     "train/importers/topics.py": "train/importers/test_log_importers.py",
     "train/simulate/families.py": "train/simulate/test_simulate_scene.py",

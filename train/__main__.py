@@ -13,7 +13,6 @@ COMMANDS = {
     "study": "train.commands.study",
     "tradeoff": "train.commands.tradeoff",
     "show": "train.commands.show",
-    "split": "train.commands.split",
     "thresholds": "train.commands.thresholds",
 }
 """Modules by command; see `edge.cli.add_commands`."""

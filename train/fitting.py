@@ -86,9 +86,10 @@ def fit(data: DataSet | str | Path | Sequence[str | Path], **options: Any) -> Fi
 
     Options you pass are held fixed. The others are chosen for each task among the
     candidates of `train.choose.choose`: the features and projection of the smallest model
-    within one standard error of the best in cross-validation (the most accurate one
-    where fewer than 100 single trials are left out), with the scaling,
-    shrinkage, components and k that are best there.
+    within one standard error of the best in cross-validation (the one whose
+    answers have the best grades where fewer than 200 single trials are left out, see
+    `train.choose.answers`), with the scaling, shrinkage, components and k that are best
+    there.
 
     Args:
         data: recordings, folders of them, or a data set that was loaded for the
@@ -111,6 +112,8 @@ def fit(data: DataSet | str | Path | Sequence[str | Path], **options: Any) -> Fi
             less often, if the number of trials and the size of the model allow it.
         threshold: counts above which a taxel is in contact.
         onset: counts above which a contact begins.
+        release: seconds that a contact may be away and go on. Where None they are the
+            skin's, or more where that is more accurate (`train.data.pieces.joined`).
         arm: for recordings with joint angles that name no arm.
         quick: fewer candidates and folds.
         jobs: processes; all cores where None.

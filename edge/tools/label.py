@@ -224,7 +224,6 @@ def changed(
     after = {task: after[task] for task in after if task not in without}
     if meta.get("contacts") and after != before:
         raise InputError(
-            f"{name}: its contacts have labels of their own; `python -m train split` "
-            "makes a recording of each"
+            f"{name}: its contacts have labels of their own; change meta.contacts"
         )
     return after

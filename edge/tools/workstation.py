@@ -16,7 +16,6 @@ COMMANDS = (
     "study",
     "tradeoff",
     "show",
-    "split",
     "thresholds",
 )
 """`export` is a program of its own; `python -m train` runs the others."""

@@ -74,7 +74,7 @@ def test_the_same_data_gives_the_same_files(recordings, exported, tmp_path):
 
 
 def test_fixed_values_and_some_tasks(recordings, tmp_path):
-    fixed = "--scaling II --components 3 --k 2 --window 0.8 --threshold 120"
+    fixed = "--scaling II --components 3 --k 2 --window 0.8 --threshold 120 --release 2"
     of_model = "--tasks object --name pads"
     words = f"{fixed} {of_model}".split()
     export(tmp_path, "--data", recordings, *words, *PAPER)
@@ -88,7 +88,7 @@ def test_fixed_values_and_some_tasks(recordings, tmp_path):
     assert task.projection == "pca"
     assert task.features == info.features
     assert info.window_s == 0.8
-    assert info.layout.threshold_counts == 120
+    assert (info.layout.threshold_counts, info.layout.release_s) == (120, 2.0)
 
 
 @pytest.mark.parametrize(
@@ -139,7 +139,7 @@ def test_options_that_make_no_sense_are_one_sentence(
     [
         ([], None, None),
         (["--decision-points", "none"], None, ()),
-        (["--decision-points", "0.9,0.3"], 1.2, (0.3, 0.9, 1.2)),
+        (["--decision-points", "0.9,0.3"], None, (0.3, 0.9, 1.2)),
         (["--decision-points", "0.2:2:0.3", "--window", "0.8"], 0.8, (0.2, 0.5, 0.8)),
     ],
 )

@@ -4,15 +4,26 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from edge.arrays import Booleans, Integers
 from train.choose.crossval import votes_right
-from train.choose.search import Decomposition, SearchGrid
+from train.choose.search import (
+    Decomposition,
+    SearchGrid,
+    Space,
+    clearness,
+    nearest,
+)
 from train.data.vectors import Vectors
 from train.model.scaling import centred_and_scaled
 from train.threads import single_thread
+
+RIGHT = 0.51
+"""Grade of a right answer, however near another label is."""
 
 
 @dataclass(frozen=True)
@@ -57,13 +68,18 @@ class _Fit:
         self,
         task: str,
         grid: SearchGrid,
+        spaces: Sequence[Space],
         neighbours: Integers,
         members: Integers,
-    ) -> Booleans:
+    ) -> NDArray[Any]:
         """(candidates, test) whether a grid's candidates are right, by the neighbours
-        among some of the trials."""
-        labels = self.classes[task]
-        right = votes_right(neighbours, labels[members], labels[self.test])
+        among some of the trials in some spaces; or their grades."""
+        labels = self.classes[task][members]
+        answers = self.classes[task][self.test]
+        right: NDArray[Any] = votes_right(neighbours, labels, answers)
+        if grid.graded:
+            clear = clearness(spaces, labels, answers)[..., None]
+            right = RIGHT * right + (1.0 - RIGHT) * clear
         places = [min(k, right.shape[-1]) - 1 for k in grid.neighbours]
         # One row for each candidate: for each projection, each k.
         rows = right[..., places].transpose(0, 2, 1)
@@ -75,11 +91,16 @@ def answers_without(
     classes: Mapping[str, Integers],
     left_out: Booleans,
     grids: Sequence[SearchGrid],
-) -> dict[str, Booleans]:
+) -> dict[str, NDArray[Any]]:
     """{task: (candidates, test) whether each candidate is right} of the fit without
-    some trials, by a mask (n,), which answers these."""
+    some trials, by a mask (n,), which answers these.
+
+    Those of `graded` grids have grades in place of that: more than a half where the
+    answer is right, and the more, the more clearly the right label is nearest
+    (`clearness`).
+    """
     fit = _Fit(vectors, classes, np.flatnonzero(~left_out), np.flatnonzero(left_out))
-    answers: dict[str, list[Booleans]] = {}
+    answers: dict[str, list[NDArray[Any]]] = {}
     decomposed = None
     with single_thread():
         for grid in grids:
@@ -89,13 +110,12 @@ def answers_without(
                 if decomposed != scaled:
                     decomposed = scaled
                     decomposition = fit.decomposition(grid, members)
-                neighbours = None
+                spaces: list[Space] = []
                 for task in tasks:
-                    if neighbours is None or (
-                        grid.projection == "lda" and not grid.targets
-                    ):
-                        neighbours = decomposition.neighbours(grid, task)
-                    answers.setdefault(task, []).append(
-                        fit.right(task, grid, neighbours, members)
-                    )
+                    if not spaces or (grid.projection == "lda" and not grid.targets):
+                        spaces = decomposition.spaces(grid, task)
+                        most = min(grid.neighbours[-1], len(members))
+                        neighbours = nearest(spaces, most)
+                    right = fit.right(task, grid, spaces, neighbours, members)
+                    answers.setdefault(task, []).append(right)
     return {task: np.concatenate(right) for task, right in answers.items()}

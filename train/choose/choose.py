@@ -37,9 +37,6 @@ from train.model.pipeline import Choice, Choices
 from train.model.stopping import Early
 from train.progress import bar
 
-FEW_TRIALS = 100
-"""With fewer trials the most accurate candidate is taken, whatever its price; with 140
-that gains less, and a dearer model takes longer to fit."""
 UNSEEN_SHRINKAGE = 0.1
 """Smallest shrinkage tried where entire groups are left out. Less shrinkage relies on
 differences that are small beside the features' spread, which do not carry over to new
@@ -93,8 +90,7 @@ class Choosing:
         self._jobs = jobs
         self._progress = progress
         self._widths = dict(zip(dataset.names, dataset.widths(samples), strict=True))
-        is_few = len(divisions.folds) < FEW_TRIALS
-        self._is_few = is_few and bool(divisions.further)
+        self._is_few = bool(divisions.further)
         self._rule_of_groups = partial(rule_among, widths=self._widths)
         self._rule_of_trials = partial(self._rule_of_groups, is_few=self._is_few)
 
@@ -123,7 +119,8 @@ class Choosing:
         folds = self._divisions.folds
         further_folds = self._divisions.further
         grouped = [task for task in self._y if self._is_grouped(task)]
-        by_trial = for_tasks(candidates, {*self._y}.difference(grouped))
+        alone = {*self._y}.difference(grouped)
+        by_trial = for_tasks(candidates, alone, graded=self._is_few and nested)
         total = fits(folds, nested)
         total += sum(fits(division, False) for division in further_folds)
         if self._groups is not None:
@@ -224,13 +221,17 @@ class Choosing:
     def choose(self, window_s: float) -> Settings:
         """Each task's settings."""
         vectors = self._vectors(window_s)
-        trials, groups = self._protocols(
-            *self._tables(vectors, self.candidates, "choosing", nested=True)
-        )
+        tables = self._tables(vectors, self.candidates, "choosing", nested=True)
+        trials = TrialsLeftOut(tables[0], self._widths, self._is_few)
+        groups = None
+        if self._groups is not None:
+            groups = GroupsLeftOut(tables[1], self._widths, groups=self._groups)
         chosen = {}
         of_task = {}
         for task in self._y:
-            protocol = self._protocol(task, trials, groups)
+            protocol = trials
+            if groups is not None and self._is_grouped(task):
+                protocol = groups
             chosen[task], of_task[task] = self._settle(task, protocol, trials)
         without = by_folds(of_task)
         plans: dict[str, Plan] = {TRIAL: (trials.folds, without)}
@@ -239,26 +240,6 @@ class Choosing:
             plans[groups.name] = groups.folds, by_folds(by_group)
         together = decided_together(chosen, vectors, plans, self._jobs)
         return Settings(together, trials.folds, without, self.candidates, window_s, [])
-
-    def _protocols(
-        self,
-        trials: AnswerTable,
-        groups: AnswerTable,
-    ) -> tuple[TrialsLeftOut, GroupsLeftOut | None]:
-        """What is left out, with the answers to it."""
-        by_trial = TrialsLeftOut(trials, self._widths, self._is_few)
-        if self._groups is None:
-            return by_trial, None
-        return by_trial, GroupsLeftOut(groups, self._widths, groups=self._groups)
-
-    def _protocol(
-        self,
-        task: str,
-        trials: TrialsLeftOut,
-        groups: GroupsLeftOut | None,
-    ) -> TrialsLeftOut:
-        """By what a task's settings are chosen."""
-        return groups if groups is not None and self._is_grouped(task) else trials
 
     def early(
         self,
@@ -313,6 +294,7 @@ class Choosing:
             candidates=tuple(best and promise(best[0]) for best in of_candidates),
             picks=tuple(best and best[1] for best in of_candidates),
             folds=protocol.folds,
+            agreed=protocol.agreed(task),
         )
         return chosen, without
 
@@ -338,15 +320,16 @@ def _grouped_tasks(groups: Groups, y: Labels) -> frozenset[str]:
 
 
 def for_tasks(
-    candidates: Sequence[Candidate], tasks: Collection[str]
+    candidates: Sequence[Candidate], tasks: Collection[str], *, graded: bool = False
 ) -> list[SearchGrid]:
-    """The grids that are for some of the tasks, as candidates for these alone."""
+    """The grids that are for some of the tasks, as candidates for these alone, whose
+    answers are `graded` or not."""
     limited = []
     for candidate in candidates:
         for grid in candidate.grids:
             served = tuple(task for task in sorted(tasks) if grid.is_for(task))
             if served:
-                limited.append(replace(grid, tasks=served))
+                limited.append(replace(grid, tasks=served, graded=graded))
     return limited
 
 

@@ -148,8 +148,11 @@ def settle_early(
         fewest[task] = int(labelled.sum() - labelled.max())
     runs = []
     for option in options:
-        at_points = [*[option] * len(SHARES), full]
-        runs.append([[_with_at_most(fewest, at) for at in at_points]] * FOLDS)
+        at_points = [
+            {task: replace(c, k=min(c.k, fewest[task])) for task, c in at.items()}
+            for at in (*[option] * len(SHARES), full)
+        ]
+        runs.append([at_points] * FOLDS)
     answered = held_out(vectors, left_out, runs, jobs)
     factors = factors_of(y)
     best: dict[str, list[Choice]] = {}
@@ -167,14 +170,6 @@ def settle_early(
             best[task].append(options[int(np.argmin(errors))][task])
     choices, *by_fold = by_folds(best)
     return Early(choices, by_fold)
-
-
-def _with_at_most(
-    neighbours: Mapping[str, int],
-    choices: Choices,
-) -> dict[str, Choice]:
-    """Settings with at most so many neighbours for each task."""
-    return {t: replace(c, k=min(c.k, neighbours[t])) for t, c in choices.items()}
 
 
 def by_folds(choices: Mapping[str, Sequence[Choice]]) -> list[dict[str, Choice]]:

@@ -101,6 +101,8 @@ class Promise(Result):
         return wilson(self.right / self.variance, self.total / self.variance)
 
 
+WRONG = 0.5
+"""Highest grade of a wrong answer."""
 RuleOf = Callable[[Sequence[Choice]], Rule]
 
 
@@ -113,7 +115,8 @@ class AnswerTable:
         choices: {task: the candidates}.
         right: {task: (folds, candidates, n)} whether the fit without a fold, and
             without the trial's own fold, answers the trial rightly; True for trials
-            that are not tested.
+            that are not tested. Or the grades of the answers (`answers_without`), by
+            which the candidates are chosen then.
         tested: {task: (n,) whether a trial has a label and a fold}; all where a task
             has no entry.
         repeated: tables of the same candidates by other folds, whose answers to
@@ -138,7 +141,7 @@ class AnswerTable:
         choices = list(choices_of(pair, len(fold_numbers(self.folds))))
         return np.asarray(self.running[task][choices].any(axis=0))
 
-    def enter(self, pair: Pair, answers: Mapping[str, Booleans]) -> None:
+    def enter(self, pair: Pair, answers: Mapping[str, NDArray[Any]]) -> None:
         """Take in the answers {task: (candidates, tests)} of the fit without a pair of
         folds to the trials of both."""
         folds = self.folds[np.isin(self.folds, pair)]
@@ -148,8 +151,8 @@ class AnswerTable:
             for without, tested in {pair, pair[::-1]}:
                 in_fold = self.folds == tested
                 untested = ~self.tested[task][in_fold]
-                self.right[task][without][np.ix_(fitted, in_fold)] = (
-                    right[:, folds == tested] | untested
+                self.right[task][without][np.ix_(fitted, in_fold)] = np.where(
+                    untested, True, right[:, folds == tested]
                 )
 
     def drop(self, reach: int, rule_of: RuleOf) -> None:
@@ -210,17 +213,12 @@ class AnswerTable:
         that fold, without the folds where it was dropped."""
         trials = np.arange(len(self.folds))
         places = np.array(candidates)[self.folds]
-        hits = self._alone(task)[places, trials]
+        hits = self._alone(task)[places, trials] > WRONG
         tested = self.tested.get(task, self.folds >= 0)
         tested = tested & self._running(task)[self.folds, places, 0]
         hits = hits[tested]
         usual = self.choices[task][int(np.bincount(candidates).argmax())]
         return Result(int(hits.sum()), len(hits), usual.components, usual.k, hits=hits)
-
-
-def chosen(table: AnswerTable, task: str, rule: Rule = MOST_ACCURATE) -> int:
-    """The candidate chosen by all trials."""
-    return rule.choose(table.plain(task))
 
 
 def chosen_by_fold(
@@ -331,7 +329,8 @@ def _empty(
             numbers[task] = np.repeat(np.arange(len(grids)), sizes)
             running[task] = np.ones((count + 1, sum(sizes)), dtype=bool)
             tested[task] = (labels >= 0) & (folds >= 0)
-            right[task] = np.tile(~tested[task], (count, sum(sizes), 1))
+            untested = np.tile(~tested[task], (count, sum(sizes), 1))
+            right[task] = untested * 1.0 if grids[0].graded else untested
     return AnswerTable(folds, choices, right, tested, (), numbers, running)
 
 

@@ -4,15 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 from joblib import cpu_count
 
 from edge.errors import InputError
 from edge.touch.arm import Chain
 from edge.touch.features import SAMPLES
-from train.choose.candidates import Candidate, Fixed, candidates, features_of
+from train.choose.candidates import Fixed, candidates, features_of
 from train.choose.choose import Choosing
-from train.data import thresholds
+from train.data import pieces, thresholds
 from train.data.contacts import Untouched
 from train.data.dataset import DataSet, Measurement, Recordings, load_trials
 from train.data.groups import LEAVE_OUT, Divisions, are_drawn, kinds_of
@@ -31,6 +32,7 @@ class FitOptions(Fixed):
     decision_points_s: Sequence[float] | None = None
     threshold: int | None = None
     onset: int | None = None
+    release: float | None = None
     arm: Chain | None = None
     quick: bool = False
     jobs: int | None = None
@@ -48,25 +50,6 @@ class FitOptions(Fixed):
             return self.decision_points_s[-1]
         return self.window_s
 
-    def candidates_for(
-        self,
-        dataset: DataSet,
-        y: Labels,
-        *,
-        drawn: bool,
-    ) -> list[Candidate]:
-        """The candidates for some trials."""
-        joints = dataset.joints > 0
-        shear = dataset.layout.axes is not None
-        return candidates(
-            y,
-            self,
-            joints=joints,
-            shear=shear,
-            drawn=drawn,
-            quick=self.quick,
-        )
-
     def choosing(self, dataset: DataSet, y: Labels, *, drawn: bool) -> Choosing:
         """The choice of the settings of some trials.
 
@@ -80,10 +63,18 @@ class FitOptions(Fixed):
                 f"k must be 1 to {most}, the trials that remain of "
                 f"{len(divisions.folds)} where some are left out, not {self.k}"
             )
+        tried = candidates(
+            y,
+            self,
+            joints=dataset.joints > 0,
+            shear=dataset.layout.axes is not None,
+            drawn=drawn,
+            quick=self.quick,
+        )
         return Choosing(
             dataset,
             y,
-            self.candidates_for(dataset, y, drawn=drawn),
+            tried,
             divisions,
             self.samples,
             self.processes,
@@ -123,10 +114,14 @@ def trials_of(
     )
     measurement = Measurement(features_of(usual), windows[-1], arm=options.arm)
 
-    def by(threshold: int | None, onset: int | None) -> DataSet:
+    def by(
+        threshold: int | None,
+        onset: int | None,
+        release_s: float | None = options.release,
+    ) -> DataSet:
         return load_trials(
             recordings,
-            replace(measurement, threshold=threshold, onset=onset),
+            replace(measurement, threshold=threshold, onset=onset, release_s=release_s),
             partial=True,
             progress=options.progress,
             jobs=options.processes,
@@ -136,14 +131,21 @@ def trials_of(
         hasty = replace(options, quick=True, progress=False)
         y = labels_of_tasks(trials, options.tasks)
         choosing = hasty.choosing(trials, y, drawn=are_drawn(trials))
-        return choosing.accuracy(windows[0])
+        return max(map(choosing.accuracy, {windows[0], windows[-1]}))
 
+    notes: list[str] = []
     if options.threshold is not None or options.onset is not None:
-        return Loaded(by(options.threshold, options.onset), windows, [])
-    dataset, notes = _by_noise(recordings, by)
-    if not any("simulation" in r.meta for r in recordings.recordings):
-        dataset, lower = thresholds.chosen(dataset, by, accuracy)
-        notes += lower
+        dataset = by(options.threshold, options.onset)
+    else:
+        dataset, notes = _by_noise(recordings, by)
+        if not any("simulation" in r.meta for r in recordings.recordings):
+            dataset, lower = thresholds.chosen(dataset, by, accuracy)
+            notes += lower
+    if options.release is None:
+        layout = dataset.layout
+        longer = partial(by, layout.threshold_counts, layout.onset)
+        dataset, across = pieces.joined(dataset, longer, accuracy)
+        notes += across
     return Loaded(dataset, windows, notes)
 
 

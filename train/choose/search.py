@@ -9,7 +9,7 @@ import numpy as np
 from sklearn.neighbors import NearestNeighbors
 
 from edge.arrays import Floats, Integers
-from train.model.pipeline import Choice
+from train.model.pipeline import Choice, squared_distances
 from train.model.projection import Spectrum
 
 COMPONENTS = (1, 2, 3, 4, 5, 6, 7, 8, 10, 12, 14, 17, 20)
@@ -34,6 +34,7 @@ class SearchGrid:
         targets: tasks whose discriminants `lda` sets side by side; the task itself
             where empty.
         tasks: the tasks it is a candidate for; all where empty.
+        graded: answers count by their grades, see `train.choose.answers`.
     """
 
     scaling: str = "none"
@@ -45,6 +46,7 @@ class SearchGrid:
     neighbours: tuple[int, ...] = NEIGHBOURS
     targets: tuple[str, ...] = ()
     tasks: tuple[str, ...] = ()
+    graded: bool = False
 
     def is_for(self, task: str) -> bool:
         """Whether these are candidates for a task."""
@@ -76,7 +78,11 @@ class SearchGrid:
         ]
 
 
-def _nearest(spaces: Sequence[tuple[Floats, Floats]], k: int) -> Integers:
+Space = tuple[Floats, Floats]
+"""Coordinates (n, c) of training rows, and (m, c) of those tested."""
+
+
+def nearest(spaces: Sequence[Space], k: int) -> Integers:
     """(spaces, m, k) rows of training (n, c) nearest to each tested one (m, c), in each
     of some spaces of both; equal ones in their order.
 
@@ -94,6 +100,27 @@ def _nearest(spaces: Sequence[tuple[Floats, Floats]], k: int) -> Integers:
         squares = np.take_along_axis(squares, rows, axis=-1)
     order = np.lexsort((rows, squares), axis=-1)
     return np.take_along_axis(rows, order, axis=-1)
+
+
+def clearness(spaces: Sequence[Space], labels: Integers, answers: Integers) -> Floats:
+    """(spaces, m) how clearly the right label is nearest to each tested row, 0 to 1.
+
+    It is 1 less the Brier score of a confidence that needs no calibration: the inverse
+    square of the distance to the nearest row of the right label, over the sum of this
+    and that of any other. Without a row of the right label it is 0.
+
+    Args:
+        spaces: with coordinates of the same rows.
+        labels: (n,) class indices of the training rows.
+        answers: (m,) the right ones.
+    """
+    same = answers[:, None] == labels
+    squares = np.stack([squared_distances(new, rows) for rows, new in spaces])
+    right = np.where(same, squares, np.inf).min(axis=2)
+    other = np.where(same, np.inf, squares).min(axis=2)
+    with np.errstate(invalid="ignore"):
+        doubt = np.nan_to_num(right / (right + other), nan=1.0)
+    return np.asarray(1.0 - doubt**2)
 
 
 def _squares(training: Floats, tested: Floats) -> Floats:
@@ -157,14 +184,12 @@ class Decomposition:
             tuple[str, tuple[float, ...]], list[tuple[Floats, Floats]]
         ] = {}
 
-    def neighbours(self, grid: SearchGrid, task: str) -> Integers:
-        """(projections, m, k) training rows, for each projection of a grid."""
-        k = min(grid.neighbours[-1], len(self._spectrum.rows))
+    def spaces(self, grid: SearchGrid, task: str) -> list[Space]:
+        """[projection of a grid] the coordinates of training and new rows."""
         if grid.projection == "pca":
             axes = self._spectrum.leading(grid.components[-1]).T
             training, tested = _rounded(self._spectrum.rows @ axes, self._new @ axes)
-            spaces = [(training[:, :c], tested[:, :c]) for c in grid.components]
-            return _nearest(spaces, k)
+            return [(training[:, :c], tested[:, :c]) for c in grid.components]
         by_target = [
             self._discriminants(target, grid.shrinkages)
             for target in grid.targets or (task,)
@@ -174,7 +199,7 @@ class Decomposition:
             rows, new = zip(*coordinates, strict=True)
             most = grid.most_directions
             spaces.append(_rounded(_beside(rows)[:, :most], _beside(new)[:, :most]))
-        return _nearest(spaces, k)
+        return spaces
 
     @cached_property
     def _new_scores(self) -> Floats:

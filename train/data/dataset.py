@@ -260,6 +260,8 @@ class Measurement:
             not know which object it touches.
         onset: counts above which a contact begins; scaled with the threshold where
             None.
+        release_s: seconds that a contact may be away and go on; those of the first
+            recording where None.
         arm: for recordings with joint angles that name no arm.
     """
 
@@ -267,6 +269,7 @@ class Measurement:
     horizon_s: float = 2.0
     threshold: int | None = None
     onset: int | None = None
+    release_s: float | None = None
     arm: Chain | None = None
 
     @cached_property
@@ -287,7 +290,9 @@ class Measurement:
     def layout(self, data: Recordings) -> SkinLayout:
         """The skin of recordings, as it is measured."""
         skin = with_thresholds(data.of_owner[0].layout, self.threshold, self.onset)
-        return replace(skin, dead=_dead(data.recordings), axes=axes(self.types))
+        release_s = skin.release_s if self.release_s is None else self.release_s
+        dead = _dead(data.recordings)
+        return replace(skin, dead=dead, axes=axes(self.types), release_s=release_s)
 
 
 USUAL = Measurement()

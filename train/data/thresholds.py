@@ -31,7 +31,7 @@ QUIETEST = 0.2
 LOWER = (0.5, 0.25, 0.0)
 """Parts of the recorded thresholds that are tried where touches are missed."""
 FEWEST_GAINED = 1.5
-"""Recordings that lower thresholds must decide right more often."""
+"""Recordings that must be decided right more often."""
 
 
 @dataclass(frozen=True)
@@ -167,11 +167,8 @@ def chosen(
     if not unfelt or present[1] == 0:
         return dataset, []
     datasets = [dataset, *(load(*level) for level in levels if level != present)]
-    shares = [accuracy(candidate) for candidate in datasets]
-    best = int(np.argmax(shares))
-    n = len(dataset.trials) + len(dataset.untouched)
-    error = np.sqrt(n * shares[0] * (1.0 - shares[0]))
-    if n * (shares[best] - shares[0]) <= max(error, FEWEST_GAINED):
+    best, shares = most_accurate(datasets, accuracy)
+    if best == 0:
         return dataset, []
     layout = datasets[best].layout
     return datasets[best], [
@@ -181,3 +178,19 @@ def chosen(
         "cross-validation "
         f"{shares[best]:.1%} against {shares[0]:.1%} (--threshold and --onset set them)"
     ]
+
+
+def most_accurate(
+    datasets: Sequence[DataSet], accuracy: Callable[[DataSet], float]
+) -> tuple[int, list[float]]:
+    """The place of the data set whose decisions are most accurate, and the accuracies.
+
+    It is that of the first one, 0, where the others gain less than a standard error or
+    a single recording.
+    """
+    shares = list(map(accuracy, datasets))
+    best = int(np.argmax(shares))
+    n = len(datasets[0].trials) + len(datasets[0].untouched)
+    error = np.sqrt(n * shares[0] * (1.0 - shares[0]))
+    gains = n * (shares[best] - shares[0]) > max(error, FEWEST_GAINED)
+    return best if gains else 0, shares

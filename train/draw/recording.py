@@ -54,7 +54,9 @@ def draw(
     onset, series = contact or (float(recording.t[0]), None)
     heights = [1.7, 3.2]
     figure = Figure(figsize=(15.0, 1.2 + sum(heights)), layout="constrained")
-    figure.suptitle(_title(recording))
+    labels = ", ".join(map(": ".join, sorted(recording.labels.items())))
+    trial = recording.meta.get("trial", "trial")
+    figure.suptitle(f"{trial}   {labels or 'without labels'}")
     grid = figure.add_gridspec(len(heights), FRAMES, height_ratios=heights)
     _frames(figure, grid, recording, layout, onset)
     third = FRAMES // 3
@@ -63,12 +65,6 @@ def draw(
         _curve(axis, feature, units(layout)[feature], series)
     with write_whole(out) as file:
         figure.savefig(file, format="png", dpi=110)
-
-
-def _title(recording: Recording) -> str:
-    """The name of a recording's trial, and its labels."""
-    labels = ", ".join(map(": ".join, sorted(recording.labels.items())))
-    return f"{recording.meta.get('trial', 'trial')}   {labels or 'without labels'}"
 
 
 def _curve(axis: Any, feature: str, unit: str, series: FeatureSeries | None) -> None:
@@ -107,14 +103,6 @@ def _shear(axis: Any, frame: Frame, region: Region, counts: float) -> None:
     along, around = frame.shear[rows, cols].T / counts
     style = {"angles": "xy", "scale_units": "xy", "scale": 1.0, "width": 0.012}
     axis.quiver(cols, rows, around, along, color="white", **style)
-
-
-def _name_axes(axis: Any, layout: SkinLayout) -> None:
-    if layout.wraps:
-        axis.set(xlabel="column (around)", ylabel="row, from elbow")
-    else:
-        axis.set(xlabel="column", ylabel="row")
-    axis.label_outer()
 
 
 def _frames(
@@ -163,6 +151,8 @@ def _frames(
             axis.plot(col % layout.cols, row, "r+", markersize=9)
             title += f", {region.area} taxels"
         axis.set_title(title, fontsize=10)
-        _name_axes(axis, layout)
+        axis.set_xlabel("column (around)" if layout.wraps else "column")
+        axis.set_ylabel("row, from elbow" if layout.wraps else "row")
+        axis.label_outer()
     bar = figure.colorbar(image, ax=axes, shrink=0.9, pad=0.01)
     bar.set_label(f"{UNITS[layout.force_unit]} per taxel")

@@ -12,6 +12,7 @@ from edge.arrays import Floats, Integers
 from edge.errors import printable
 from edge.tools.info import doubt
 from edge.touch import measures
+from train.choose.protocols import HALVINGS
 from train.choose.settings import Chosen
 from train.data import outliers
 from train.data.dataset import DataSet
@@ -48,6 +49,10 @@ def summary(fitted: Fitted, prices: Prices) -> str:
     for task, chosen in fitted.chosen.items():
         lines.append(f"{task}: {accuracy(chosen)}")
         lines.append(f"  {_described(chosen.choice, fitted)}")
+        lines.append(
+            f"  halves of the folds choose the same features and projection in "
+            f"{chosen.agreed} of {HALVINGS} divisions"
+        )
         if fitted.early is not None:
             early = _described(fitted.early.choices[task], fitted)
             lines.append(f"  before {fitted.window_s:g} s: {early}")
@@ -174,8 +179,7 @@ def _left_out(dataset: DataSet) -> Iterator[str]:
     if dataset.unused:
         yield (
             "warning: only the first of several contacts is used in "
-            f"{_files(dataset.unused)}; `python -m train split` makes a recording of "
-            "each contact"
+            f'{_files(dataset.unused)}; with meta.contacts of "alike" each is a trial'
         )
 
 

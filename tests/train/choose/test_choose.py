@@ -12,7 +12,12 @@ from edge.saving import save
 from edge.statistics import wilson
 from train.choose.choose import Choosing, decided_together
 from train.choose.evaluate import AnswerTable, Promise
-from train.choose.protocols import GroupsLeftOut, TrialsLeftOut, rule_among
+from train.choose.protocols import (
+    HALVINGS,
+    GroupsLeftOut,
+    TrialsLeftOut,
+    rule_among,
+)
 from train.choose.settings import Chosen
 from train.data.groups import Divisions, Groups
 from train.data.parts import part
@@ -49,6 +54,21 @@ def test_settings_are_chosen_by_left_out_trials_or_groups_also_without_a_fold(
     assert [choice.k for choice in (chosen.choice, *without)] == [k] * 4
     assert chosen.accuracy.accuracy == 1.0
     assert chosen.by_trial.accuracy == by_trial
+
+
+def test_halves_of_the_folds_agree_where_one_candidate_is_right_in_all_of_them():
+    choices = [Choice("IV", 1, 1, features=(name,)) for name in TWO]
+    folds = np.arange(40) // 10
+    best = np.stack([folds >= 0, folds < 0])
+    mixed = np.stack([folds < 2, folds >= 2])
+
+    def agreed(right):
+        table = AnswerTable(folds, {"t": choices}, {"t": np.stack([right] * 4)})
+        return TrialsLeftOut(table, dict.fromkeys(TWO, 1), is_few=True).agreed("t")
+
+    assert agreed(best) == HALVINGS
+    # They differ where a half has both folds in which one of the two is right.
+    assert 0 < agreed(mixed) < HALVINGS
 
 
 def test_among_few_trials_the_most_accurate_is_chosen_whatever_its_price():

@@ -13,12 +13,12 @@ from train.choose.evaluate import (
     AnswerTable,
     Promise,
     Result,
-    chosen,
     chosen_by_fold,
     evaluate,
     fits,
     nested_accuracy,
 )
+from train.choose.rule import Rule
 from train.choose.search import SearchGrid
 from train.data.folds import group_folds, stratified_folds
 from train.data.vectors import Vectors
@@ -166,9 +166,40 @@ def test_further_divisions_count_in_the_choice_by_all_trials_alone():
         [0.5, 0.5, 0.5, 0.0],
         [1.0, 1.0, 0.5, 0.5],
     ]
-    assert chosen(repeated_table, "t") == 1
+    assert Rule().choose(repeated_table.plain("t")) == 1
     assert chosen_by_fold(repeated_table, "t") == [0, 0]
     assert chosen_by_fold(table(first), "t") == [0, 0]
+
+
+def test_of_graded_candidates_that_are_equally_right_the_clearer_is_chosen():
+    vectors = trials()
+    y = vectors.y["t"]
+    # Both tell the labels in every trial; by the second feature type they are closer.
+    X = np.zeros((36, 12))
+    X[:, 0] = np.unique(y, return_inverse=True)[1]
+    noise = np.random.default_rng(0).uniform(-0.2, 0.2, 36)
+    X[:, 6] = X[:, 0] + noise
+    blurred = SearchGrid("none", "pca", ("contact_area",), (1,), neighbours=(3,))
+    clear = replace(blurred, features=("max_force",))
+    graded = [replace(grid, graded=True) for grid in (blurred, clear)]
+    folds = stratified_folds(y, 4)
+    plain = evaluate(replace(vectors, X=X), folds, [blurred, clear])
+    table = evaluate(replace(vectors, X=X), folds, graded)
+    assert Rule().choose(plain.plain("t")) == 0
+    assert Rule().choose(table.plain("t")) == 1
+    assert chosen_by_fold(table, "t") == [1] * 4
+
+
+def test_a_graded_answer_that_is_wrong_counts_as_wrong():
+    vectors = trials()
+    folds = stratified_folds(vectors.y["t"], 4)
+    graded = [replace(grid, graded=True) for grid in GRIDS]
+    plain = evaluate(vectors, folds, GRIDS)
+    table = evaluate(vectors, folds, graded)
+    assert 0 < plain.answered("t", [0] * 4).right < 36
+    for candidate in range(len(plain.choices["t"])):
+        places = [candidate] * 4
+        assert table.answered("t", places) == plain.answered("t", places)
 
 
 def test_folds_spread_each_class_evenly():

@@ -35,6 +35,8 @@ def test_each_candidate_has_a_row_with_its_accuracies_and_prices(fitted):
     assert lines[1].count("*") == len(fitted.chosen)
     assert lines[2].startswith("* chosen; in brackets, ")
     assert not lines[3]
+    agree = "  halves of the folds choose the same features and projection in 20 of 20"
+    assert f"{agree} divisions" in lines
 
 
 def test_flattering_data_and_left_out_recordings_get_a_warning(
