@@ -4,16 +4,32 @@ nodes."""
 from __future__ import annotations
 
 import copy
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import Any
 
 import numpy as np
-from onnx import TensorProto, numpy_helper
+from onnx import NodeProto, TensorProto, helper, numpy_helper
 
-from edge.arrays import Floats, Integers
+from edge.arrays import Array, Floats, Integers
+from edge.errors import InputError
 from train.model.projection import MOST_STEPS, Projection
 
-OPSET = 18
+STORED = ("int16", "float32", "float64")
+"""Types of constants in a model file."""
+
+
+def smallest(values: Floats, kinds: Iterable[str]) -> Array:
+    """Numbers in the first type that holds them exactly.
+
+    Raises:
+        InputError: none does.
+    """
+    for kind in kinds:
+        with np.errstate(all="ignore"):
+            small = values.astype(kind)
+        if np.array_equal(small.astype(np.float64), values):
+            return small
+    raise InputError("a constant of the graph is not a number")
 
 
 class Builder:
@@ -22,14 +38,15 @@ class Builder:
     Attributes:
         decision_point: name of the scalar that says which decision point is asked for;
             unused without decision points.
+        made: nodes, in the order of computation.
+        constants: by their contents.
     """
 
-    def __init__(self, scope: Any, container: Any, decision_point: str = "") -> None:
-        self._scope = scope
-        self._container = container
-        self.decision_point = decision_point
-        self._constants: dict[tuple[Any, ...], str] = {}
-        self._made: dict[tuple[Any, ...], str] = {}
+    def __init__(self) -> None:
+        self.decision_point = ""
+        self.made: list[NodeProto] = []
+        self.constants: dict[tuple[Any, ...], TensorProto] = {}
+        self._results: dict[tuple[Any, ...], str] = {}
 
     def among(self, decision_points: Sequence[int], count: int) -> Builder:
         """A builder of the same graph, whose constants stand for some of `count`
@@ -48,23 +65,12 @@ class Builder:
         those that are given a name."""
         array = np.asarray(value)
         key = (name, array.dtype.str, array.shape, array.tobytes())
-        if key not in self._constants:
-            stored_name = name or self._scope.get_unique_variable_name("constant")
-            tensor = numpy_helper.from_array(
-                np.ascontiguousarray(array).reshape(array.shape), stored_name
+        if key not in self.constants:
+            self.constants[key] = numpy_helper.from_array(
+                np.ascontiguousarray(array).reshape(array.shape),
+                name or f"constant {len(self.constants)}",
             )
-            # the container's method stores equal constants once, whatever their names
-            if name:
-                self._container.initializers.append(tensor)
-            else:
-                self._container.add_initializer(
-                    stored_name,
-                    tensor.data_type,
-                    list(array.shape),
-                    tensor,
-                )
-            self._constants[key] = stored_name
-        return self._constants[key]
+        return self.constants[key].name
 
     def by_decision_point(self, values: Sequence[Any], name: str = "") -> str:
         """Name of the value, at the decision point that is asked for, of a constant."""
@@ -75,22 +81,16 @@ class Builder:
         return self.node("Gather", stack, self.decision_point, axis=0)
 
     def by_decision_point_small(self, values: Sequence[Any], name: str = "") -> str:
-        """As `by_decision_point`, stored in float32 where that holds all values
+        """As `by_decision_point`, stored in the smallest type that holds all values
         exactly.
 
         A single value is converted when the model is loaded, and costs a decision
         nothing.
         """
-        with np.errstate(over="ignore"):
-            small = [np.asarray(value).astype(np.float32) for value in values]
-        if not all(map(np.array_equal, small, values)):
-            return self.by_decision_point(values, name)
-        return self.stored(values, np.float32, name)
-
-    def stored(self, values: Sequence[Any], dtype: Any, name: str = "") -> str:
-        """As `by_decision_point`, of values that a smaller type holds."""
-        small = [np.asarray(value).astype(dtype) for value in values]
-        stored = self.by_decision_point(small, name)
+        small = smallest(np.stack(values), STORED)
+        stored = self.by_decision_point(list(small), name)
+        if small.dtype == np.float64:
+            return stored
         return self.node("Cast", stored, to=TensorProto.DOUBLE)
 
     def shifted(self, operator: str, x: str, y: str, shifts: Sequence[int]) -> str:
@@ -121,9 +121,9 @@ class Builder:
         """
         names = self._names(inputs)
         key = (operator, *names, *sorted(attributes.items()))
-        if output or key not in self._made:
-            self._made[key] = self.nodes(operator, names, [output], **attributes)[0]
-        return self._made[key]
+        if output or key not in self._results:
+            self._results[key] = self.nodes(operator, names, [output], **attributes)[0]
+        return self._results[key]
 
     def nodes(
         self,
@@ -133,19 +133,10 @@ class Builder:
         **attributes: Any,
     ) -> list[str]:
         """Add an operator, as `node`; returns the names of its outputs."""
-        input_names = self._names(inputs)
-        names = [
-            o or self._scope.get_unique_variable_name(operator.lower()) for o in outputs
-        ]
-        label = self._scope.get_unique_operator_name(operator)
-        self._container.add_node(
-            operator,
-            input_names,
-            names,
-            op_version=OPSET,
-            name=label,
-            **attributes,
-        )
+        place = len(self.made)
+        names = [name or f"{operator} {place} {i}" for i, name in enumerate(outputs)]
+        made = helper.make_node(operator, self._names(inputs), names, **attributes)
+        self.made.append(made)
         return names
 
     def _names(self, inputs: Sequence[Any]) -> list[str]:

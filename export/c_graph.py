@@ -9,11 +9,12 @@ from math import prod
 
 import numpy as np
 
-from edge.arrays import Array, Floats
+from edge.arrays import Array
 from edge.errors import InputError
 from edge.model.graph import Graph
 from edge.model.model import Model
 from edge.model.onnx_file import Node
+from export.build import smallest
 
 ELEMENT_WISE = "Add Sub Mul Div Max LessOrEqual Where Clip Round Sqrt".split()
 NAMES = {
@@ -75,7 +76,6 @@ class CompiledGraph:
         self.places = {"features": 0}
         self._numbers: dict[tuple[tuple[int, ...], bytes], int] = {}
         graph = Graph(model.contents)
-        self._makers = graph.makers
         self._values = []
         for point in points:
             inputs = {
@@ -89,30 +89,19 @@ class CompiledGraph:
         for node in model.contents.nodes:
             if not self._variable.isdisjoint(node.inputs):
                 self._variable.update(node.outputs)
-        outputs = list(model.outputs)
-        ordered: dict[str, Node] = {}
-        for output in outputs:
-            self._collect(output, ordered)
-        nodes = list(ordered.values())
-        self._place(nodes, outputs)
+        needed = set(model.outputs)
+        nodes: list[Node] = []
+        for node in reversed(model.contents.nodes):
+            if not needed.isdisjoint(self._variable.intersection(node.outputs)):
+                needed.update(self._inputs(node))
+                nodes.insert(0, node)
+        self._place(nodes, model.outputs)
         self.steps = [step for node in nodes for step in self._steps(node)]
-
-    def _collect(self, name: str, nodes: dict[str, Node]) -> None:
-        """Add the nodes that make a value, by their first output.
-
-        One output comes after another, so that few values are kept at once.
-        """
-        if name in self._variable - {"features"}:
-            node = self._makers[name]
-            if node.outputs[0] not in nodes:
-                for source in self._inputs(node):
-                    self._collect(source, nodes)
-                nodes[node.outputs[0]] = node
 
     def _shape(self, name: str) -> tuple[int, ...]:
         return self._values[0][name].shape
 
-    def _place(self, nodes: Sequence[Node], outputs: Sequence[str]) -> None:
+    def _place(self, nodes: Sequence[Node], outputs: Iterable[str]) -> None:
         """Give each value a place in the arena, from its first use to its last."""
         last = {}
         for i, node in enumerate(nodes):
@@ -197,18 +186,8 @@ class CompiledGraph:
         key = values.shape, values.tobytes()
         if key not in self._numbers:
             self._numbers[key] = len(self.tables)
-            self.tables.append(table_of(values))
+            self.tables.append(smallest(values, TYPES))
         return self.arena + self._numbers[key]
-
-
-def table_of(values: Floats) -> Array:
-    """Numbers in the smallest type that holds them exactly."""
-    for kind in TYPES:
-        with np.errstate(all="ignore"):
-            small = values.astype(kind)
-        if np.array_equal(small.astype(float), values):
-            return small
-    raise InputError("a constant of the graph is not a number")
 
 
 def _gap(taken: Iterable[tuple[int, int]], size: int) -> int:

@@ -20,7 +20,8 @@ from edge.touch.feature import KERNELS
 from edge.touch.kernels import KernelTable, channels_of
 from edge.touch.layout import SkinLayout
 from export import c_code
-from export.c_graph import CompiledGraph, table_of
+from export.build import smallest
+from export.c_graph import TYPES, CompiledGraph
 from export.graph import to_onnx
 from tests.conftest import ROOT, ended, export, in_a_row, save_touches, touch
 from tests.edge.model.test_engines import hostile
@@ -411,7 +412,7 @@ def test_a_table_takes_the_smallest_type_that_holds_it():
         ([0.5, np.inf], "float32"),
         ([0.1], "float64"),
     ):
-        table = table_of(np.array(values))
+        table = smallest(np.array(values), TYPES)
         assert table.dtype.name == kind
         assert table.tolist() == values
 
