@@ -10,8 +10,9 @@ from typing import Any
 import numpy as np
 from onnx import NodeProto, TensorProto, helper, numpy_helper
 
-from edge.arrays import Array, Floats, Integers
+from edge.arrays import Array, Floats
 from edge.errors import InputError
+from train.model.pipeline import FittedSpace
 from train.model.projection import MOST_STEPS, Projection
 
 STORED = ("int16", "float32", "float64")
@@ -184,13 +185,9 @@ def product(
 
 
 def project(
-    build: Builder,
-    x: str,
-    width: int,
-    decision_points: Sequence[Projection],
-    columns: Sequence[Integers],
+    build: Builder, spaces: Sequence[FittedSpace], width: int
 ) -> tuple[str, str]:
-    """Nodes that take features (n, p) to whole coordinates; see
+    """Nodes that take `features` (n, width) to whole coordinates; see
     `train.model.projection.Projection`.
 
     Decision points that take the same columns share nodes. Of several such nodes, those
@@ -198,18 +195,18 @@ def project(
 
     Args:
         build: takes the nodes.
-        x: name of the features.
-        width: their number, p.
-        decision_points: a projection for each.
-        columns: of the features, that each takes.
+        spaces: of each decision point.
+        width: the number of features.
 
     Returns:
         Names of the coordinates (n, c) in the grid's units, and of how much was cut off
         to get them (n, 1): 0 within the training set's reach, not finite where a
         feature is not.
     """
-    count = len(decision_points)
-    components = max(p.weights_.shape[1] for p in decision_points)
+    count = len(spaces)
+    projections = [space.projection for space in spaces]
+    columns = [space.columns for space in spaces]
+    components = max(p.weights_.shape[1] for p in projections)
     starts = [0]
     for point in range(1, count):
         if not np.array_equal(columns[point], columns[point - 1]):
@@ -217,19 +214,22 @@ def project(
     products = []
     for start, end in zip(starts, [*starts[1:], count], strict=True):
         part = build if len(starts) == 1 else build.among(range(start, end), count)
-        selected = x
+        selected = "features"
         if len(columns[start]) < width:
-            selected = build.node("Gather", x, columns[start], axis=1)
-        points = decision_points[start:end]
-        products.append(product(part, selected, points, components))
+            selected = build.node("Gather", selected, columns[start], axis=1)
+        products.append(product(part, selected, projections[start:end], components))
     rounded, far = products[0]
     for start, (later, later_far) in zip(starts[1:], products[1:], strict=True):
         is_earlier = build.by_decision_point([point < start for point in range(count)])
         rounded = build.node("Where", is_earlier, rounded, later)
         far = build.node("Where", is_earlier, far, later_far)
-    limits = [p.grid_.limit for p in decision_points]
-    z, farther = build.clipped(rounded, limits)
-    return z, build.node("Add", far, farther)
+    z, farther = build.clipped(rounded, [p.grid_.limit for p in projections])
+    off = build.node("Add", far, farther)
+    if min(map(len, columns)) < width:
+        # A feature that another task or decision point takes must be finite too.
+        zeros = build.node("Mul", "features", 0.0)
+        off = build.node("Add", off, build.node("ReduceL1", zeros, [1], keepdims=1))
+    return z, off
 
 
 def widened(arrays: Sequence[Floats], width: int) -> list[Floats]:

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Iterator, Sequence
+from functools import partial, reduce
 
 import numpy as np
 import onnx
@@ -121,15 +122,12 @@ def _vote(
     # last) is 0.
     finite = build.node("LessOrEqual", off, LARGEST)
     voters = build.node("Where", finite, voters, -1)
-    ballots = build.constant(np.eye(classes + 1, classes), f"ballots of {task}")
+    ballots = np.eye(classes + 1, classes)
     label = f"{task}_label"
     scores = f"{task}_scores"
     if k <= 2:
         # Two neighbours agree or tie: either way the nearest decides.
         build.node("Gather", voters, 0, output=label, axis=1)
-    if k == 1:
-        build.node("Gather", ballots, label, output=scores)
-        return
     cast = build.node("Gather", ballots, voters)
     build.node("ReduceMean", cast, [1], output=scores, keepdims=0)
     if k > 2:
@@ -153,7 +151,7 @@ def _build(model: Fitted) -> Builder:
     for task in model.choices:
         spaces = _spaces(points, task)
         if spaces not in projected:
-            projected[spaces] = _projected(build, points, spaces)
+            projected[spaces] = project(build, spaces, points[-1].n_features_in_)
     _out_of_range(build, [off for _, off in projected.values()])
     if isinstance(model, SequentialClassifier):
         _doubt(build, model.space_)
@@ -170,23 +168,6 @@ share the nodes of a projection."""
 
 def _spaces(points: Sequence[ContactClassifier], task: str) -> Spaces:
     return tuple(point.tasks_[task].space for point in points)
-
-
-def _projected(
-    build: Builder,
-    points: Sequence[ContactClassifier],
-    spaces: Spaces,
-) -> tuple[str, str]:
-    """Nodes that project features to a task's spaces; see `project`."""
-    projections = [space.projection for space in spaces]
-    columns = [space.columns for space in spaces]
-    width = points[-1].n_features_in_
-    z, off = project(build, "features", width, projections, columns)
-    if min(map(len, columns)) < width:
-        # A feature that another task or decision point takes must be finite too.
-        zeros = build.node("Mul", "features", 0.0)
-        off = build.node("Add", off, build.node("ReduceL1", zeros, [1], keepdims=1))
-    return z, off
 
 
 def _task(
@@ -220,9 +201,8 @@ def _task(
     z, off = projected
     rows = widened(rows, max(row.shape[1] for row in rows))
     squares = _squares_of_task(build, task, z, rows, components, labels < 0)
-    voters = build.constant([last.k], f"k of {task}")
     outputs = ["", f"{task}_neighbours"]
-    nearest, neighbours = build.nodes("TopK", [squares, voters], outputs, largest=0)
+    nearest, neighbours = build.nodes("TopK", [squares, [last.k]], outputs, largest=0)
     units = build.by_decision_point([fitted.unit for fitted in at_points])
     build.node("Mul", build.node("Sqrt", nearest), units, output=f"{task}_distances")
     _vote(build, task, labels, len(last.classes), neighbours, last.k, off)
@@ -237,7 +217,7 @@ def _out_of_range(build: Builder, excesses: Sequence[str]) -> None:
     The excess (n, 1) itself is a sum of fractions, whose last bits depend on the order
     of summation. Whether it is above 0 does not.
     """
-    most = excesses[0] if len(excesses) == 1 else build.node("Max", *excesses)
+    most = reduce(partial(build.node, "Max"), excesses)
     within = build.node("LessOrEqual", most, 0.0)
     beyond = build.node("Where", within, 0.0, 1.0)
     build.node("Squeeze", beyond, [1], output="out_of_range")
@@ -320,19 +300,16 @@ def _label_distances(
     for label, size in enumerate(sizes):
         members[label, :size] = np.flatnonzero(labels == label)
     taken = np.arange(counts.max()) < counts[:, None]
-    rows = build.constant(members, f"members of {task}")
-    most = build.constant(counts.max(keepdims=True), f"most of {task}")
-    is_vote = build.constant(taken, f"taken of {task}")
-    divisors = build.constant(counts.astype(np.float64), f"counts of {task}")
     wider = build.node("Pad", squares, [0, 0, 0, 1], np.inf)
-    squares_of_label = build.node("Gather", wider, rows, axis=1)
+    squares_of_label = build.node("Gather", wider, members, axis=1)
+    most = counts.max(keepdims=True)
     nearest, _ = build.nodes(
         "TopK", [squares_of_label, most], ["", ""], axis=2, largest=0
     )
     roots = build.node("Round", build.node("Sqrt", nearest))
-    counted = build.node("Where", is_vote, roots, 0.0)
+    counted = build.node("Where", taken, roots, 0.0)
     total = build.node("ReduceSum", counted, [2], keepdims=0)
-    distances = build.node("Div", total, divisors)
+    distances = build.node("Div", total, counts.astype(np.float64))
     factors = build.by_decision_point(scales)
     build.node("Mul", distances, factors, output=f"{task}_label_distances")
 

@@ -11,6 +11,7 @@ import pytest
 
 from edge import demo
 from edge.errors import InputError
+from edge.model.info import Novelty
 from edge.model.model import Model
 from edge.recording import Recording, load
 from edge.skin.decoder import Baseline
@@ -94,7 +95,7 @@ def recordings_for(layout, count, rng):
 
 def assert_same(model, folder, recordings, vectors=(), error=None, board=None):
     """Ask C about vectors and recordings, and compare every bit with Python's answer."""
-    c_code.write(model, folder, error)
+    c_code.export(model, folder, error)
     command = machine.compiled(folder, board)
     last = len(model.decision_points_s) - 1
     points = [last] if error is None else [*range(last + 1)]
@@ -109,6 +110,11 @@ def assert_same(model, folder, recordings, vectors=(), error=None, board=None):
         questions.append(machine.about_recording(kind, recording))
         expected.append(machine.vectors(model, points, recording))
     assert same(machine.ask(command, folder, questions), np.concatenate(expected))
+    assert_same_events(model, folder, command, recordings, error)
+
+
+def assert_same_events(model, folder, command, recordings, error=None):
+    """Compare every bit of the events of recordings."""
     kind = machine.EVENTS_OF_RECORDING
     questions = [machine.about_recording(kind, recording) for recording in recordings]
     rows = machine.ask(command, folder, questions).reshape(-1, 9)
@@ -264,7 +270,7 @@ class NoGraph:
     steps = ()
     tables = ()
 
-    def __init__(self, model, points, arena):
+    def __init__(self, model, outputs, points, arena):
         self.arena = arena
         self.places = {}
 
@@ -294,7 +300,8 @@ def test_every_feature_of_damaged_recordings_has_the_same_bits(
         debounce=int(rng.integers(1, 4)),
     )
     monkeypatch.setattr(c_code, "CompiledGraph", NoGraph)
-    c_code.write(model, tmp_path, frames=300)
+    monkeypatch.setattr(c_code, "RATE_HZ", 250.0)
+    c_code.export(model, tmp_path)
     command = machine.compiled(tmp_path)
     recordings = recordings_for(layout, 25, rng)
     kind = machine.VECTORS_OF_RECORDING
@@ -310,7 +317,7 @@ def test_the_sketch_suits_the_header(tmp_path, monkeypatch):
     model = Model(demo.MODEL)
     model.info = replace(model.info, layout=SkinLayout(1, 12))
     monkeypatch.setattr(c_code, "CompiledGraph", NoGraph)
-    c_code.write(model, tmp_path)
+    c_code.export(model, tmp_path)
     shutil.copy(ROOT / "tests" / "arduino.h", tmp_path / "Wire.h")
     sketch = ROOT / "docs" / "examples" / "firmware" / "decide" / "decide.ino"
     command = ["g++", "-std=c++11", "-Wall", "-fsyntax-only", f"-I{tmp_path}", "-xc++"]
@@ -334,7 +341,7 @@ def test_the_baseline_follows_as_pythons(tmp_path):
     for raw, readable in zip(frames, valid, strict=True):
         expected.append(baseline.above(raw.ravel()))
         baseline.follow(raw.ravel(), readable.ravel())
-    c_code.write(Model(demo.MODEL), tmp_path)
+    c_code.export(Model(demo.MODEL), tmp_path)
     question = machine.about_recording(machine.BASELINE, recording)
     answer = machine.ask(machine.compiled(tmp_path), tmp_path, [question])
     assert answer.tolist() == np.concatenate(expected).tolist()
@@ -343,7 +350,7 @@ def test_the_baseline_follows_as_pythons(tmp_path):
 
 @needs_gcc
 def test_a_frame_that_cannot_be_taken_in_is_an_error(tmp_path):
-    c_code.write(Model(demo.MODEL), tmp_path)
+    c_code.export(Model(demo.MODEL), tmp_path)
     command = machine.compiled(tmp_path)
     recording = touch()
     t = recording.t
@@ -364,7 +371,7 @@ def test_a_frame_that_cannot_be_taken_in_is_an_error(tmp_path):
 
 @needs_gcc
 def test_options_that_change_bits_do_not_compile(tmp_path):
-    c_code.write(Model(demo.MODEL), tmp_path)
+    c_code.export(Model(demo.MODEL), tmp_path)
     for option in ("-ffast-math", "-mfma"):
         words = ["gcc", option, "-c", "graph.c", "-o", "graph.o"]
         ended = subprocess.run(words, cwd=tmp_path, capture_output=True, check=False)
@@ -384,24 +391,48 @@ def test_what_c_lacks_is_one_sentence(tmp_path):
     with pytest.raises(
         InputError, match="cannot be written in C, as it takes no shear"
     ):
-        c_code.write(model, tmp_path)
+        c_code.export(model, tmp_path)
 
 
-def test_early_decisions_are_left_out_to_fit_the_flash_and_said(early, tmp_path):
-    model, _ = early
+@pytest.mark.slow
+@needs_gcc
+def test_what_does_not_fit_the_flash_is_left_out_and_said(early, tmp_path, monkeypatch):
+    model, touches = early
     error = model.info.stopping["object"].rules[-1].error
-    whole = c_code.write(model, tmp_path, error).flash
-    text = c_code.export(model, tmp_path, error, whole // 1024 - 1)
-    assert text.endswith("early decisions are left out to fit --flash")
+    sizes = [
+        c_code.Source(model, *options).flash // 1024
+        for options in ((error,), (None,), (None, False))
+    ]
+    assert sizes == sorted(sizes, reverse=True)
+    novelty = "novelty (nothing is unusual or unknown, and confidence is that of"
+    for flash_kb, said in (
+        (sizes[0] + 1, "133 MHz)"),
+        (sizes[0], "left out to fit --flash: early decisions"),
+        (
+            sizes[1],
+            f"left out to fit --flash: early decisions, {novelty} a usual touch)",
+        ),
+    ):
+        assert c_code.export(model, tmp_path, error, flash_kb).endswith(said)
+    text = c_code.export(model, tmp_path, None, sizes[1])
+    assert f"left out to fit --flash: {novelty}" in text
     with pytest.raises(InputError, match="kB of flash in C, above --flash"):
-        c_code.export(model, tmp_path / "none", None, 20)
+        c_code.export(model, tmp_path / "none", error, sizes[2])
     assert not (tmp_path / "none").exists()
+    info = model.info
+    never = (np.inf,) * len(model.decision_points_s)
+    stopping = {k: replace(v, remoteness=None) for k, v in info.stopping.items()}
+    novelty = Novelty(never, never)
+    monkeypatch.setattr(
+        model, "info", replace(info, novelty=novelty, stopping=stopping)
+    )
+    assert_same_events(model, tmp_path, machine.compiled(tmp_path), touches)
 
 
 def test_a_file_in_the_folder_s_place_is_one_sentence(tmp_path):
     (tmp_path / "file").touch()
     with pytest.raises(InputError, match="cannot be written: .*file is a file"):
-        c_code.write(Model(demo.MODEL), tmp_path / "file")
+        c_code.export(Model(demo.MODEL), tmp_path / "file")
 
 
 def test_a_table_takes_the_smallest_type_that_holds_it():
@@ -419,7 +450,7 @@ def test_a_table_takes_the_smallest_type_that_holds_it():
 
 def test_the_arena_is_shared_by_values_that_do_not_meet():
     model = Model(demo.MODEL)
-    graph = CompiledGraph(model, [0], 0)
+    graph = CompiledGraph(model, model.outputs, [0], 0)
     values = sum(len(step.outputs) * step.sizes[0] for step in graph.steps)
     assert graph.arena < values / 3
     assert graph.places["object_label"] < graph.arena
