@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from onnx import NodeProto, TensorProto, helper, numpy_helper
 
-from edge.arrays import Array, Floats
+from edge.arrays import Array, Floats, Integers
 from edge.errors import InputError
 from train.model.pipeline import FittedSpace
 from train.model.projection import MOST_STEPS, Projection
@@ -55,6 +55,8 @@ class Builder:
 
         At the others it takes the constants of the nearest of these.
         """
+        if len(decision_points) == count:
+            return self
         first = decision_points[0]
         places = np.clip(np.arange(count), first, decision_points[-1]) - first
         part = copy.copy(self)
@@ -67,10 +69,8 @@ class Builder:
         array = np.asarray(value)
         key = (name, array.dtype.str, array.shape, array.tobytes())
         if key not in self.constants:
-            self.constants[key] = numpy_helper.from_array(
-                np.ascontiguousarray(array).reshape(array.shape),
-                name or f"constant {len(self.constants)}",
-            )
+            stored_name = name or f"constant {len(self.constants)}"
+            self.constants[key] = numpy_helper.from_array(array, stored_name)
         return self.constants[key].name
 
     def by_decision_point(self, values: Sequence[Any], name: str = "") -> str:
@@ -94,10 +94,10 @@ class Builder:
             return stored
         return self.node("Cast", stored, to=TensorProto.DOUBLE)
 
-    def shifted(self, operator: str, x: str, y: str, shifts: Sequence[int]) -> str:
-        """Name of an operator's whole result, divided by 2^shift and rounded."""
+    def shifted(self, x: str, y: str, shifts: Sequence[int]) -> str:
+        """Name of a whole product of matrices, divided by 2^shift and rounded."""
         factors = self.by_decision_point([2.0**-shift for shift in shifts])
-        product = self.node(operator, x, y)
+        product = self.node("MatMul", x, y)
         return self.node("Round", self.node("Mul", product, factors))
 
     def squared_length(self, x: str) -> str:
@@ -207,13 +207,10 @@ def project(
     projections = [space.projection for space in spaces]
     columns = [space.columns for space in spaces]
     components = max(p.weights_.shape[1] for p in projections)
-    starts = [0]
-    for point in range(1, count):
-        if not np.array_equal(columns[point], columns[point - 1]):
-            starts.append(point)
+    starts = changes(columns)
     products = []
     for start, end in zip(starts, [*starts[1:], count], strict=True):
-        part = build if len(starts) == 1 else build.among(range(start, end), count)
+        part = build.among(range(start, end), count)
         selected = "features"
         if len(columns[start]) < width:
             selected = build.node("Gather", selected, columns[start], axis=1)
@@ -230,6 +227,15 @@ def project(
         zeros = build.node("Mul", "features", 0.0)
         off = build.node("Add", off, build.node("ReduceL1", zeros, [1], keepdims=1))
     return z, off
+
+
+def changes(arrays: Sequence[Integers]) -> list[int]:
+    """Where arrays differ from the one before; the first counts."""
+    places = [0]
+    for i in range(1, len(arrays)):
+        if not np.array_equal(arrays[i], arrays[i - 1]):
+            places.append(i)
+    return places
 
 
 def widened(arrays: Sequence[Floats], width: int) -> list[Floats]:

@@ -7,7 +7,6 @@ import os
 import re
 import string
 from collections.abc import Iterable, Mapping, Sized
-from itertools import pairwise
 from math import ceil, inf, prod
 from pathlib import Path
 
@@ -71,16 +70,16 @@ def export(
             certified, the least that can be written is larger than `flash_kb`, or the
             folder cannot be written.
     """
-    left_out = []
+    left_out = ""
     source = Source(model, error)
     limit = 1024 * flash_kb if flash_kb else source.flash
     if source.flash > limit and error is not None:
-        left_out.append("early decisions")
+        left_out += "; early decisions are left out to fit --flash"
         source = Source(model)
     if source.flash > limit and model.info.novelty is not None:
-        left_out.append(
-            "novelty (nothing is unusual or unknown, and confidence is that of a usual "
-            "touch)"
+        left_out += (
+            "; novelty is left out to fit --flash: nothing is unusual or unknown, and "
+            "confidence is that of a usual touch"
         )
         source = Source(model, doubts=False)
     if source.flash > limit:
@@ -90,14 +89,13 @@ def export(
         )
     source.write(folder)
     millions = source.work / 1e6
-    size = (
+    return (
         f"{os.fspath(folder)}: {source.flash / 1024:.0f} kB of flash, "
         f"{source.ram / 1024:.0f} kB of RAM, a decision in about {millions:.1f} million "
         f"instructions of a Cortex-M4F ({millions / 0.064:.0f} ms at 64 MHz) or "
         f"{2.2 * millions:.1f} million of a Cortex-M0+ ({2.2 * millions / 0.133:.0f} ms "
-        "at 133 MHz)"
+        f"at 133 MHz){left_out}"
     )
-    return "; left out to fit --flash: ".join(filter(None, (size, ", ".join(left_out))))
 
 
 class Source:
@@ -184,7 +182,7 @@ class Source:
         of_region = "REGION_" * (alone and feature.zone == "contact")
         kinds = [f"EC_T_{kind.upper()}" for kind in feature.transforms]
         return [
-            float(transforms.floor_of(feature, self._layout)),
+            transforms.floor_of(feature, self._layout),
             samples,
             rows,
             "EC_NO_ZONE" if alone else f"EC_{feature.zone.upper()}",
@@ -240,20 +238,18 @@ class Source:
         layout = self._layout
         along, around = layout.pitch
         angles = layout.column_angles_deg or (0.0,)
-        steps = [
-            (b - a + 180.0) % 360.0 - 180.0 for a, b in pairwise([*angles, angles[0]])
-        ]
+        steps = (np.diff([*angles, angles[0]]) + 180.0) % 360.0 - 180.0
         links = []
         for kind, axis, step, after in (
             self._info.chain.links if self._info.chain else ()
         ):
             links.append([axis, np.ravel(step), after, f"EC_{kind.upper()}"])
         self.values |= {
-            "along": float(along),
-            "around": float(around),
+            "along": along,
+            "around": around,
             "scale": float(layout.counts_per_newton or 1.0),
-            "force_floor": float(transforms.force_floor(layout)),
-            "length_floor": float(transforms.length_floor(layout)),
+            "force_floor": transforms.force_floor(layout),
+            "length_floor": transforms.length_floor(layout),
             "column_angles": len(angles) > 1,
             "alive": layout.alive.reshape(-1),
             "angles": zip(angles, steps, strict=True),
@@ -269,14 +265,12 @@ class Source:
             stride = (table.ndim - 1) * table.shape[-1]
             tables.append([values, stride, f"EC_{kind.upper()}"])
             self.flash += table.nbytes
-        steps = []
-        for s in graph.steps:
-            steps.append([f"EC_{s.operator.upper()}", s.inputs, s.outputs, s.sizes])
-            is_product = s.operator in ("Gemm", "MatMul")
-            self.work += 16 * prod(s.sizes) if is_product else 400 * max(s.sizes)
-        self.flash += 44 * len(steps)
+        for step in graph.steps:
+            is_product = step.operator in ("EC_GEMM", "EC_MATMUL")
+            self.work += 16 * prod(step.sizes) if is_product else 400 * max(step.sizes)
+        self.flash += 44 * len(graph.steps)
         self.ram += 8 * graph.arena
-        self.values |= {"arena": graph.arena, "tables": tables, "steps": steps}
+        self.values |= {"arena": graph.arena, "tables": tables, "steps": graph.steps}
 
     def _tasks(
         self, places: Mapping[str, int], rules: Mapping[str, StoppingRule | None]
@@ -355,7 +349,7 @@ def literal(value: object) -> str:
         return str(int(value))  # type: ignore[call-overload]
     if np.isinf(value):
         return "(double)INFINITY"
-    return float(value).hex() + "f" * isinstance(value, np.float32)
+    return float(value).hex()
 
 
 def array(kind: str, values: Iterable[object]) -> str:
@@ -378,7 +372,7 @@ def lacks(info: ModelInfo) -> Iterable[str]:
     if (total * max(2 * layout.cols, layout.rows)) ** 2 >= LARGEST:
         yield f"the sums of {layout.rows} x {layout.cols} taxels exceed 64 bits"
     for feature in feature_types(info.features):
-        summed = feature.summary in ("mean", "deviation", "roughness")
+        summed = feature.summary not in ("", "rate")
         if summed and (feature.samples or info.samples) > MOST_SUMMED:
             yield f"{feature.name} sums up more than {MOST_SUMMED} samples"
 
@@ -386,6 +380,7 @@ def lacks(info: ModelInfo) -> Iterable[str]:
 def _of_taxels(layout: SkinLayout, cells: Cells) -> Array:
     """(taxels,) the cell that each belongs to; -1 where it has no living taxel."""
     rows, cols = np.indices(layout.shape) // cells.side
-    blocks = (rows * layout.cols + cols).reshape(-1)
-    living = np.unique(blocks[layout.alive.reshape(-1)])
-    return np.where(np.isin(blocks, living), living.searchsorted(blocks), -1)
+    blocks = rows * layout.cols + cols
+    living = np.unique(blocks[layout.alive])
+    cell_of_block = living.searchsorted(blocks)
+    return np.where(np.isin(blocks, living), cell_of_block, -1).ravel()

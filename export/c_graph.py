@@ -4,8 +4,8 @@ and the decision point alone is computed here."""
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence, Set
-from dataclasses import dataclass
 from math import prod
+from typing import NamedTuple
 
 import numpy as np
 
@@ -16,13 +16,7 @@ from edge.model.model import Model
 from edge.model.onnx_file import Node
 from export.build import smallest
 
-ELEMENT_WISE = "Add Sub Mul Div Max LessOrEqual Where Clip Round Sqrt".split()
-NAMES = {
-    "GatherElements": "Gather",
-    "GatherND": "Gather",
-    "Squeeze": "Max",
-}
-"""{operator: that of C}; the larger of a value and itself is a copy."""
+ELEMENT_WISE = "Add Sub Mul Div Max LessOrEqual Where Clip Round Sqrt Squeeze".split()
 TYPES = {
     "int8": "int8_t",
     "int16": "int16_t",
@@ -33,12 +27,11 @@ TYPES = {
 """{type of a table: that in C}, from the smallest."""
 
 
-@dataclass(frozen=True)
-class Step:
+class Step(NamedTuple):
     """A node; see `ec_step` in `export/c/internal.h`.
 
     Attributes:
-        operator: of ONNX.
+        operator: its name in C.
         inputs, outputs: places in the arena, or behind it numbers of tables.
         sizes: as the operator's function in `export/c/graph.c` takes them.
     """
@@ -125,26 +118,23 @@ class CompiledGraph:
     def _step(self, node: Node) -> Step:
         """The step of a node."""
         names = self._inputs(node)
-        operator = NAMES.get(node.operator, node.operator)
-        if operator == "Where" and len(names) == 2:
-            operator = "Max"
+        operator = node.operator
+        if operator == "Where" and len(names) == 1:
+            operator = "Squeeze"
         inputs = list(map(self._operand, names))
         outputs = [self.places[name] for name in node.outputs]
-        return Step(operator, inputs, outputs, self._sizes(node, operator))
+        sizes = self._sizes(node, operator)
+        return Step(f"EC_{operator.upper()}", inputs, outputs, sizes)
 
     def _inputs(self, node: Node) -> list[str]:
-        """The inputs without those that say which axes; of a copy its input twice."""
-        if node.operator == "Squeeze":
-            return node.inputs[:1] * 2
+        """The inputs; one alone of a `Where` that chooses the same at all points."""
         if node.operator == "Where" and node.inputs[0] not in self._variable:
             conditions = np.array([at[node.inputs[0]] for at in self._values])
             if conditions.all():
-                return node.inputs[1:2] * 2
+                return node.inputs[1:2]
             if not conditions.any():
-                return node.inputs[2:] * 2
-        if node.operator == "TopK" or node.operator.startswith("Reduce"):
-            return node.inputs[:1]
-        return node.inputs[::2] if node.operator == "Pad" else node.inputs
+                return node.inputs[2:]
+        return node.inputs
 
     def _sizes(self, node: Node, operator: str) -> list[int]:
         """The sizes of a step."""

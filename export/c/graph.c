@@ -57,6 +57,7 @@ static void element_wise(const ec_step *step) {
       case EC_WHERE: out[i] = x != 0.0 ? y : z; break;
       case EC_CLIP: out[i] = x < y ? y : x > z ? z : x; break;
       case EC_ROUND: out[i] = ec_rint(x); break;
+      case EC_SQUEEZE: out[i] = x; break;
       default: out[i] = ec_sqrt(x);
     }
   }
@@ -165,7 +166,7 @@ static void pad(const ec_step *step) {
   operand x = operand_at(step->inputs[0]);
   double *out = ec_arena + step->outputs[0];
   for (uint32_t i = 0; i < step->sizes[ALONG]; i++) out[i] = at(x, i);
-  out[step->sizes[ALONG]] = at(operand_at(step->inputs[1]), 0);
+  out[step->sizes[ALONG]] = at(operand_at(step->inputs[2]), 0);
 }
 
 static void arg_max(const ec_step *step) {
@@ -188,7 +189,9 @@ void ec_graph(uint32_t point) {
       case EC_REDUCESUMSQUARE:
       case EC_REDUCEMEAN: reduce(step); break;
       case EC_TOPK: top_k(step); break;
-      case EC_GATHER: gather(step); break;
+      case EC_GATHER:
+      case EC_GATHERELEMENTS:
+      case EC_GATHERND: gather(step); break;
       case EC_PAD: pad(step); break;
       case EC_ARGMAX: arg_max(step); break;
       default: element_wise(step);

@@ -404,18 +404,16 @@ def test_what_does_not_fit_the_flash_is_left_out_and_said(early, tmp_path, monke
         for options in ((error,), (None,), (None, False))
     ]
     assert sizes == sorted(sizes, reverse=True)
-    novelty = "novelty (nothing is unusual or unknown, and confidence is that of"
-    for flash_kb, said in (
-        (sizes[0] + 1, "133 MHz)"),
-        (sizes[0], "left out to fit --flash: early decisions"),
-        (
-            sizes[1],
-            f"left out to fit --flash: early decisions, {novelty} a usual touch)",
-        ),
+    early_out = "; early decisions are left out to fit --flash"
+    no_novelty = "; novelty is left out to fit --flash: nothing is unusual or unknown"
+    for error_rate, flash_kb, said in (
+        (error, sizes[0] + 1, "at 133 MHz)"),
+        (error, sizes[0], f"at 133 MHz){early_out}"),
+        (None, sizes[1], f"at 133 MHz){no_novelty}"),
+        (error, sizes[1], f"at 133 MHz){early_out}{no_novelty}"),
     ):
-        assert c_code.export(model, tmp_path, error, flash_kb).endswith(said)
-    text = c_code.export(model, tmp_path, None, sizes[1])
-    assert f"left out to fit --flash: {novelty}" in text
+        text = c_code.export(model, tmp_path, error_rate, flash_kb)
+        assert text.split(", and confidence")[0].endswith(said)
     with pytest.raises(InputError, match="kB of flash in C, above --flash"):
         c_code.export(model, tmp_path / "none", error, sizes[2])
     assert not (tmp_path / "none").exists()
