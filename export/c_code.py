@@ -309,7 +309,7 @@ class Source:
         """The curves of a task: those of the decision points, and that of the rules."""
         stopping = self._info.stopping.get(task)
         if stopping is None:
-            return [0, ()]
+            return [0, (0, 0, 0)]
         curves = zip(stopping.slopes, stopping.intercepts, stopping.doubts, strict=True)
         rules = stopping.slope, stopping.intercept, stopping.doubt
         return [array("ec_curve", [*curves][-self._last :]), rules]

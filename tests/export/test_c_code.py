@@ -30,6 +30,7 @@ from tests.export.microcontroller import machine
 from tests.export.test_graph import fit, hard_set
 from tests.hard_cases.models import describe
 from train.model.pipeline import Choice
+from train.model.scaling import SCALINGS
 
 needs_gcc = pytest.mark.skipif(shutil.which("gcc") is None, reason="there is no gcc")
 TOOLS = ("arm-none-eabi-gcc", "qemu-system-arm")
@@ -157,7 +158,7 @@ def test_the_demo_has_the_same_bits(tmp_path):
     model = Model(demo.MODEL)
     rng = np.random.default_rng(1)
     touches = [load(path) for path in sorted(demo.FOLDER.glob("*.npz"))]
-    touches += [damaged(recording, rng) for recording in touches * 3]
+    touches += [damaged(recording, rng) for recording in touches * 25]
     golden = np.load(Path(__file__).parents[1] / "golden" / "demo.npz")["vectors"]
     near = np.nextafter(golden[:20], np.inf)
     assert_same(
@@ -203,28 +204,41 @@ def test_a_microcontroller_has_the_same_bits(early, tmp_path, board):
     assert_same(model, tmp_path, touches[::3], vectors, error, board)
 
 
-RANDOM = [
-    (kind, projection, scaling, k)
-    for projection, scaling, k in (
-        ("pca", "IV", 1),
-        ("lda", "none", 3),
-        ("pca", "I", 6),
-    )
-    for kind in ("plain", "lattice", "duplicates", "outlier", "far")
-][::2]
+def hostile_blends(X, count, rng):
+    """Vectors of every kind: trained ones, blends of two and what lies beyond them, an
+    ulp beside these, and some with a number that is huge, tiny, infinite or none."""
+    first, second = X[rng.integers(0, len(X), (2, count))]
+    weights = rng.choice([0.0, 0.5, 1.0, 1.5, -1e4, 1e30], (count, 1))
+    vectors = first + weights * (second - first)
+    beside = np.nextafter(vectors, rng.choice([-np.inf, np.inf], vectors.shape))
+    vectors = np.where(rng.random((count, 1)) < 0.3, beside, vectors)
+    odd = rng.choice([np.nan, np.inf, -np.inf, 1e308, -1e308, 5e-324, -0.0], count)
+    rows = np.flatnonzero(rng.random(count) < 0.2)
+    vectors[rows, rng.integers(0, X.shape[1], len(rows))] = odd[rows]
+    return vectors
 
 
 @pytest.mark.slow
 @needs_gcc
-@pytest.mark.parametrize(("kind", "projection", "scaling", "k"), RANDOM)
-def test_a_random_models_graph_has_the_same_bits(
-    tmp_path, kind, projection, scaling, k
-):
-    X, queries = hard_set(kind, np.random.default_rng(k))
-    choices = {"t": Choice(scaling, 6, min(k, len(X)), projection)}
+@pytest.mark.parametrize("seed", range(10))
+def test_a_random_models_graph_has_the_same_bits_of_hostile_vectors(tmp_path, seed):
+    """All trials may vote, each may have a label of its own, and tasks may lack some."""
+    rng = np.random.default_rng(seed)
+    kinds = "plain lattice duplicates outlier far".split()
+    X, queries = hard_set(kinds[seed % 5], rng)
+    choices = {}
+    for task in ("t", "some", "more")[: 1 + seed % 3]:
+        choices[task] = Choice(
+            str(rng.choice(SCALINGS)),
+            int(rng.integers(1, 25)),
+            int(rng.integers(1, len(X) // 2 + 1)),
+            str(rng.choice(["pca", "lda"])),
+        )
+    labels = int(rng.integers(2, len(X) + 1))
+    fitted = fit(X, choices, labels, lack=list(choices)[1:2])
     path = tmp_path / "model.onnx"
-    path.write_bytes(to_onnx(fit(X, choices), describe(fit(X, choices), samples=8)))
-    vectors = [*queries, *hostile(X.shape[1], np.random.default_rng(6))]
+    path.write_bytes(to_onnx(fitted, describe(fitted, samples=8)))
+    vectors = [*queries, *hostile(24, rng), *hostile_blends(X, 500, rng)]
     assert_same(Model(path), tmp_path / "c", [], vectors)
 
 
