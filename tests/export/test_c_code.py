@@ -4,16 +4,19 @@ M33 under QEMU."""
 import shutil
 import subprocess
 from dataclasses import replace
+from itertools import cycle
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from edge import demo
+from edge.elementary import logistic
 from edge.errors import InputError
-from edge.model.info import Novelty
+from edge.model.info import Novelty, margin
 from edge.model.model import Model
 from edge.recording import Recording, load
+from edge.saving import save
 from edge.skin.decoder import Baseline
 from edge.skin.file import Signal
 from edge.touch import measures
@@ -24,9 +27,10 @@ from export import c_code
 from export.build import smallest
 from export.c_graph import TYPES, CompiledGraph
 from export.graph import to_onnx
-from tests.conftest import ROOT, ended, export, in_a_row, save_touches, touch
+from tests.conftest import ROOT, ended, export, in_a_row, touch
 from tests.edge.model.test_engines import hostile
 from tests.export.microcontroller import machine
+from tests.export.test_early_stopping import pressed
 from tests.export.test_graph import fit, hard_set
 from tests.hard_cases.models import describe
 from train.model.pipeline import Choice
@@ -87,11 +91,40 @@ def recordings_for(layout, count, rng):
                     int
                 )
         t = np.arange(n) / 100.0 + rng.uniform(0, 50)
-        joints = 0.05 * rng.normal(size=(n, 5)).cumsum(axis=0)
+        turns = rng.choice([0.05, 1e4])
+        joints = turns * rng.normal(size=(n, 5)).cumsum(axis=0)
         frames = np.minimum(frames, 65535).astype(np.uint16)
         meta = {"skin": layout.to_dict()}
         recordings.append(damaged(Recording(t, frames, joints, meta=meta), rng))
     return recordings
+
+
+def on_the_edges(layout):
+    """Contacts that stand on the edge of a comparison, from 0 s on."""
+    count = layout.onset + 100
+    frames = np.zeros((8, 140, *layout.shape), np.uint16)
+    t = np.tile(np.arange(140) / 100, (8, 1))
+    frames[0, :10, 2, 1] = layout.onset
+    frames[0, 10:, 2, 1] = layout.onset + 1
+    frames[1, :, 1, 1] = frames[1, :, 5, 3] = count  # equal regions
+    frames[2, :, 2, [0, 1, -1]] = count  # about the seam
+    frames[3, ::4, 2, 0] = frames[3, 1::4, 2, 0] = count  # half-way around and back
+    frames[3, 2::4, 2, layout.cols // 2] = frames[3, 3::4, 2, layout.cols // 2] = count
+    for row in (0, 3, 6):  # on a line
+        frames[4, :, row, row // 3] = count + 31 * row
+    frames[5:, :, 2, 1:3] = count + 7 * np.arange(140)[:, None]
+    frames[5, [30, 60, 120]] = 0  # lifted off as a window ends
+    frames[6, 20] = 0  # as it is released
+    t[6, 20:] += layout.release_s - 0.01 - 5e-7
+    t[7, 1:] = np.arange(1, 140) * 0.6 / 39 + 5e-7  # as kernels are taken
+    joints = np.linspace(0, [2e5, -3e4, 1, 2, 3], 141)
+    # The frame before says that the touch was not under way.
+    t = np.insert(t, 0, -0.01, axis=1)
+    frames = np.insert(frames, 0, 0, axis=1)
+    valid = np.ones(frames[0].shape, bool)
+    valid[:, 0, 3] = False
+    more = {"joints": joints, "valid": valid, "meta": {"skin": layout.to_dict()}}
+    return [Recording(*of, **more) for of in zip(t, frames, strict=True)]
 
 
 def assert_same(model, folder, recordings, vectors=(), error=None, board=None):
@@ -138,19 +171,21 @@ def ordered(events):
 
 @pytest.fixture(scope="module")
 def early(tmp_path_factory):
-    """A model that decides early, of features of every kind, and touches new to it."""
+    """A model that decides early, of features of every kind, with a product and ties,
+    and touches new to it."""
     folder = tmp_path_factory.mktemp("early")
-    data = save_touches(folder / "data", 15)
+    for i, recording in enumerate(pressed(touch, range(8))):
+        save(folder / "data" / f"{i:02d}.npz", recording)
     words = ["--features", "contact", "moments", "joints", "--quick", "--scaling", "IV"]
-    words += ["--decision-points", "0.3,0.6,1.2", "--c", folder / "c"]
-    model = Model(export(folder / "out", "--data", data, *words) / "model.onnx")
+    words += ["--k", "2", "--decision-points", "0.3,0.6,1.2", "--c", folder / "c"]
+    out = export(folder / "out", "--data", folder / "data", *words)
+    model = Model(out / "model.onnx")
+    assert model.info.products.keys() == {"category"}
     rng = np.random.default_rng(5)
-    touches = [
-        touch(kind=kind, seed=30 + i) for i in range(4) for kind in ("hard", "soft")
-    ]
+    touches = list(pressed(touch, range(30, 32)))
     touches.append(in_a_row(touch(seed=50, seconds=0.5), touch(seed=51)))
     touches += [damaged(recording, rng) for recording in touches]
-    return model, touches
+    return model, [*touches, *on_the_edges(model.info.layout)]
 
 
 @needs_gcc
@@ -174,6 +209,60 @@ def test_early_decisions_have_the_same_bits(early, tmp_path):
     errors = {s.rules[i].error for s in model.info.stopping.values() for i in (0, -1)}
     for i, error in enumerate([None, *sorted(errors)]):
         assert_same(model, tmp_path / str(i), touches, vectors, error)
+
+
+def on_its_limits(model, recording):
+    """Metadata whose limits and certified confidences are a contact's own scores."""
+    info = model.info
+    points = range(len(info.decision_points_s))
+    vectors = machine.vectors(model, points, recording)[1:].reshape(len(points), -1)
+    answers = [model.run(vectors[i : i + 1], i) for i in points]
+    limits, far = (
+        tuple(answer[name].item() for answer in answers)
+        for name in ("novelty", "remoteness")
+    )
+    stopping = {}
+    for task, of_task in info.stopping.items():
+        label = answers[0][f"{task}_label"].item()
+        evidence = margin(answers[0][f"{task}_label_distances"][0].tolist(), label)
+        log_odds = of_task.slope * evidence + of_task.intercept
+        excess = info.novelty.excess(0, limits[0])
+        sure = logistic(log_odds - of_task.doubt * excess)
+        rules = [replace(r, confidence=sure, last=points[-1]) for r in of_task.rules]
+        remoteness = of_task.remoteness and replace(of_task.remoteness, limits=far)
+        stopping[task] = replace(of_task, rules=tuple(rules), remoteness=remoteness)
+    novelty = replace(info.novelty, limits=limits)
+    return replace(info, stopping=stopping, novelty=novelty)
+
+
+def half_millionths(info):
+    """Metadata by which every confidence lies closer than a float tells to half-way
+    between two millionths, above it or below it."""
+    stopping = {}
+    places = cycle((600000.5, 600001.5))
+    for task, of_task in info.stopping.items():
+        likely = next(places) / 1e6
+        x = float(np.log(likely / (1.0 - likely)))
+        while logistic(x) < likely:
+            x = float(np.nextafter(x, np.inf))
+        while logistic(x) > likely:
+            x = float(np.nextafter(x, -np.inf))
+        assert logistic(x) == likely
+        zeros = (0.0,) * len(of_task.slopes)
+        curves = {"slopes": zeros, "doubts": zeros, "intercepts": (x,) * len(zeros)}
+        stopping[task] = replace(of_task, remoteness=None, **curves)
+    return replace(info, stopping=stopping)
+
+
+@pytest.mark.slow
+@needs_gcc
+def test_scores_on_a_limit_have_the_same_bits(early, tmp_path, monkeypatch):
+    model, touches = early
+    error = max(s.rules[-1].error for s in model.info.stopping.values())
+    metadata = [on_its_limits(model, touches[i]) for i in range(3)]
+    for i, info in enumerate([*metadata, half_millionths(model.info)]):
+        monkeypatch.setattr(model, "info", info)
+        assert_same(model, tmp_path / str(i), touches[:9], error=error)
 
 
 @pytest.mark.slow
@@ -300,8 +389,8 @@ def test_every_feature_of_damaged_recordings_has_the_same_bits(
     model = Model(demo.MODEL)
     tables = {}
     for name, biases in KERNELS.items():
-        shifts = rng.integers(-12, 8, channels_of(name, layout)).tolist()
-        limits = rng.integers(-9000, 40000, biases).tolist()
+        shifts = rng.integers(-20, 3, channels_of(name, layout)).tolist()
+        limits = (rng.choice([1, 300], biases) * rng.integers(-9, 99, biases)).tolist()
         tables[name] = KernelTable(tuple(shifts), tuple(limits))
     model.info = replace(
         model.info,
@@ -317,7 +406,7 @@ def test_every_feature_of_damaged_recordings_has_the_same_bits(
     monkeypatch.setattr(c_code, "RATE_HZ", 250.0)
     c_code.export(model, tmp_path)
     command = machine.compiled(tmp_path)
-    recordings = recordings_for(layout, 25, rng)
+    recordings = [*recordings_for(layout, 25, rng), *on_the_edges(layout)]
     kind = machine.VECTORS_OF_RECORDING
     questions = [machine.about_recording(kind, recording) for recording in recordings]
     expected = [machine.vectors(model, [0], recording) for recording in recordings]
