@@ -142,8 +142,8 @@ def usual_ranges(
     ends = np.cumsum(dataset.widths(samples))[:-1]
     ranges = {}
     for name, part in zip(dataset.names, np.split(X, ends, axis=1), strict=True):
-        low, high = np.quantile(part.mean(axis=1), (0.01, 0.99))
-        ranges[name] = float(low), float(high)
+        low, high = np.quantile(part.mean(axis=1), (0.01, 0.99)).tolist()
+        ranges[name] = low, high
     return ranges
 
 

@@ -4,16 +4,33 @@ nodes."""
 from __future__ import annotations
 
 import copy
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import Any
 
 import numpy as np
-from onnx import TensorProto, numpy_helper
+from onnx import NodeProto, TensorProto, helper, numpy_helper
 
-from edge.arrays import Floats, Integers
+from edge.arrays import Array, Floats, Integers
+from edge.errors import InputError
+from train.model.pipeline import FittedSpace
 from train.model.projection import MOST_STEPS, Projection
 
-OPSET = 18
+STORED = ("int16", "float32", "float64")
+"""Types of constants in a model file."""
+
+
+def smallest(values: Floats, kinds: Iterable[str]) -> Array:
+    """Numbers in the first type that holds them exactly.
+
+    Raises:
+        InputError: none does.
+    """
+    for kind in kinds:
+        with np.errstate(all="ignore"):
+            small = values.astype(kind)
+        if np.array_equal(small.astype(np.float64), values):
+            return small
+    raise InputError("a constant of the graph is not a number")
 
 
 class Builder:
@@ -22,14 +39,15 @@ class Builder:
     Attributes:
         decision_point: name of the scalar that says which decision point is asked for;
             unused without decision points.
+        made: nodes, in the order of computation.
+        constants: by their contents.
     """
 
-    def __init__(self, scope: Any, container: Any, decision_point: str = "") -> None:
-        self._scope = scope
-        self._container = container
-        self.decision_point = decision_point
-        self._constants: dict[tuple[Any, ...], str] = {}
-        self._made: dict[tuple[Any, ...], str] = {}
+    def __init__(self) -> None:
+        self.decision_point = ""
+        self.made: list[NodeProto] = []
+        self.constants: dict[tuple[Any, ...], TensorProto] = {}
+        self._results: dict[tuple[Any, ...], str] = {}
 
     def among(self, decision_points: Sequence[int], count: int) -> Builder:
         """A builder of the same graph, whose constants stand for some of `count`
@@ -37,6 +55,8 @@ class Builder:
 
         At the others it takes the constants of the nearest of these.
         """
+        if len(decision_points) == count:
+            return self
         first = decision_points[0]
         places = np.clip(np.arange(count), first, decision_points[-1]) - first
         part = copy.copy(self)
@@ -48,23 +68,10 @@ class Builder:
         those that are given a name."""
         array = np.asarray(value)
         key = (name, array.dtype.str, array.shape, array.tobytes())
-        if key not in self._constants:
-            stored_name = name or self._scope.get_unique_variable_name("constant")
-            tensor = numpy_helper.from_array(
-                np.ascontiguousarray(array).reshape(array.shape), stored_name
-            )
-            # the container's method stores equal constants once, whatever their names
-            if name:
-                self._container.initializers.append(tensor)
-            else:
-                self._container.add_initializer(
-                    stored_name,
-                    tensor.data_type,
-                    list(array.shape),
-                    tensor,
-                )
-            self._constants[key] = stored_name
-        return self._constants[key]
+        if key not in self.constants:
+            stored_name = name or f"constant {len(self.constants)}"
+            self.constants[key] = numpy_helper.from_array(array, stored_name)
+        return self.constants[key].name
 
     def by_decision_point(self, values: Sequence[Any], name: str = "") -> str:
         """Name of the value, at the decision point that is asked for, of a constant."""
@@ -75,28 +82,22 @@ class Builder:
         return self.node("Gather", stack, self.decision_point, axis=0)
 
     def by_decision_point_small(self, values: Sequence[Any], name: str = "") -> str:
-        """As `by_decision_point`, stored in float32 where that holds all values
+        """As `by_decision_point`, stored in the smallest type that holds all values
         exactly.
 
         A single value is converted when the model is loaded, and costs a decision
         nothing.
         """
-        with np.errstate(over="ignore"):
-            small = [np.asarray(value).astype(np.float32) for value in values]
-        if not all(map(np.array_equal, small, values)):
-            return self.by_decision_point(values, name)
-        return self.stored(values, np.float32, name)
-
-    def stored(self, values: Sequence[Any], dtype: Any, name: str = "") -> str:
-        """As `by_decision_point`, of values that a smaller type holds."""
-        small = [np.asarray(value).astype(dtype) for value in values]
-        stored = self.by_decision_point(small, name)
+        small = smallest(np.stack(values), STORED)
+        stored = self.by_decision_point(list(small), name)
+        if small.dtype == np.float64:
+            return stored
         return self.node("Cast", stored, to=TensorProto.DOUBLE)
 
-    def shifted(self, operator: str, x: str, y: str, shifts: Sequence[int]) -> str:
-        """Name of an operator's whole result, divided by 2^shift and rounded."""
+    def shifted(self, x: str, y: str, shifts: Sequence[int]) -> str:
+        """Name of a whole product of matrices, divided by 2^shift and rounded."""
         factors = self.by_decision_point([2.0**-shift for shift in shifts])
-        product = self.node(operator, x, y)
+        product = self.node("MatMul", x, y)
         return self.node("Round", self.node("Mul", product, factors))
 
     def squared_length(self, x: str) -> str:
@@ -121,9 +122,9 @@ class Builder:
         """
         names = self._names(inputs)
         key = (operator, *names, *sorted(attributes.items()))
-        if output or key not in self._made:
-            self._made[key] = self.nodes(operator, names, [output], **attributes)[0]
-        return self._made[key]
+        if output or key not in self._results:
+            self._results[key] = self.nodes(operator, names, [output], **attributes)[0]
+        return self._results[key]
 
     def nodes(
         self,
@@ -133,19 +134,10 @@ class Builder:
         **attributes: Any,
     ) -> list[str]:
         """Add an operator, as `node`; returns the names of its outputs."""
-        input_names = self._names(inputs)
-        names = [
-            o or self._scope.get_unique_variable_name(operator.lower()) for o in outputs
-        ]
-        label = self._scope.get_unique_operator_name(operator)
-        self._container.add_node(
-            operator,
-            input_names,
-            names,
-            op_version=OPSET,
-            name=label,
-            **attributes,
-        )
+        place = len(self.made)
+        names = [name or f"{operator} {place} {i}" for i, name in enumerate(outputs)]
+        made = helper.make_node(operator, self._names(inputs), names, **attributes)
+        self.made.append(made)
         return names
 
     def _names(self, inputs: Sequence[Any]) -> list[str]:
@@ -193,13 +185,9 @@ def product(
 
 
 def project(
-    build: Builder,
-    x: str,
-    width: int,
-    decision_points: Sequence[Projection],
-    columns: Sequence[Integers],
+    build: Builder, spaces: Sequence[FittedSpace], width: int
 ) -> tuple[str, str]:
-    """Nodes that take features (n, p) to whole coordinates; see
+    """Nodes that take `features` (n, width) to whole coordinates; see
     `train.model.projection.Projection`.
 
     Decision points that take the same columns share nodes. Of several such nodes, those
@@ -207,38 +195,47 @@ def project(
 
     Args:
         build: takes the nodes.
-        x: name of the features.
-        width: their number, p.
-        decision_points: a projection for each.
-        columns: of the features, that each takes.
+        spaces: of each decision point.
+        width: the number of features.
 
     Returns:
         Names of the coordinates (n, c) in the grid's units, and of how much was cut off
         to get them (n, 1): 0 within the training set's reach, not finite where a
         feature is not.
     """
-    count = len(decision_points)
-    components = max(p.weights_.shape[1] for p in decision_points)
-    starts = [0]
-    for point in range(1, count):
-        if not np.array_equal(columns[point], columns[point - 1]):
-            starts.append(point)
+    count = len(spaces)
+    projections = [space.projection for space in spaces]
+    columns = [space.columns for space in spaces]
+    components = max(p.weights_.shape[1] for p in projections)
+    starts = changes(columns)
     products = []
     for start, end in zip(starts, [*starts[1:], count], strict=True):
-        part = build if len(starts) == 1 else build.among(range(start, end), count)
-        selected = x
+        part = build.among(range(start, end), count)
+        selected = "features"
         if len(columns[start]) < width:
-            selected = build.node("Gather", x, columns[start], axis=1)
-        points = decision_points[start:end]
-        products.append(product(part, selected, points, components))
+            selected = build.node("Gather", selected, columns[start], axis=1)
+        products.append(product(part, selected, projections[start:end], components))
     rounded, far = products[0]
     for start, (later, later_far) in zip(starts[1:], products[1:], strict=True):
         is_earlier = build.by_decision_point([point < start for point in range(count)])
         rounded = build.node("Where", is_earlier, rounded, later)
         far = build.node("Where", is_earlier, far, later_far)
-    limits = [p.grid_.limit for p in decision_points]
-    z, farther = build.clipped(rounded, limits)
-    return z, build.node("Add", far, farther)
+    z, farther = build.clipped(rounded, [p.grid_.limit for p in projections])
+    off = build.node("Add", far, farther)
+    if min(map(len, columns)) < width:
+        # A feature that another task or decision point takes must be finite too.
+        zeros = build.node("Mul", "features", 0.0)
+        off = build.node("Add", off, build.node("ReduceL1", zeros, [1], keepdims=1))
+    return z, off
+
+
+def changes(arrays: Sequence[Integers]) -> list[int]:
+    """Where arrays differ from the one before; the first counts."""
+    places = [0]
+    for i in range(1, len(arrays)):
+        if not np.array_equal(arrays[i], arrays[i - 1]):
+            places.append(i)
+    return places
 
 
 def widened(arrays: Sequence[Floats], width: int) -> list[Floats]:

@@ -1,22 +1,21 @@
-"""A model as C99 for a microcontroller: `model.h` and `model.c` beside the files of
-`export/c`, which hold no number of the model."""
+"""A model as C99 for a microcontroller: the files of `export/c`, of which `model.h` and
+`model.c` take the model's numbers."""
 
 from __future__ import annotations
 
 import os
+import re
 import string
-from collections.abc import Iterable, Mapping, Sequence
-from itertools import pairwise
-from math import ceil, prod
+from collections.abc import Iterable, Mapping, Sized
+from math import ceil, inf, prod
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from edge.arrays import Array
 from edge.early import stopping_rules
 from edge.errors import InputError
-from edge.model.info import ModelInfo, StoppingRule
+from edge.model.info import ModelInfo, Novelty, Remoteness, StoppingRule
 from edge.model.model import Model
 from edge.touch import measures, transforms
 from edge.touch.cells import KERNEL_CELLS, Cells
@@ -39,85 +38,50 @@ MOST_SUMMED = 128
 """Samples beyond which numpy sums up in halves."""
 ALONE = {*measures.ALONE.values(), ("contact", "area")} - {("skin", "stiffness")}
 """(zone, quantity) that need no sums of a zone."""
+DOUBTS = ("novelty", "remoteness")
+FLAGS = ("out_of_range", *DOUBTS)
+"""Outputs of the model that are of no task."""
+OTHERS = re.compile(r"[^\w -]", re.ASCII)
+"""Letters that may mean something else in C."""
 ENDS = "label scores distances neighbours label_distances".split()
 OF_LAYOUT = "rows cols wraps threshold_counts onset release_s radius_m row0_z_m".split()
 OF_INFO = "debounce window_s width joints dof".split()
 """Attributes that are constants of the preprocessor, by their names."""
 
 
-def write(
-    model: Model,
-    folder: str | os.PathLike[str],
-    error: float | None = None,
-    frames: int | None = None,
-) -> Source:
-    """Write a model's C.
-
-    Args:
-        model: the model.
-        folder: that is made.
-        error: the accepted share of wrong decisions, for early ones; None decides at
-            the full window, and leaves out the tables of the other decision points.
-        frames: the most frames of a contact within the window; `RATE_HZ` where None.
-
-    Returns:
-        What was written, with its size.
-
-    Raises:
-        InputError: C lacks something that the model needs, the error rate is not
-            certified, or the folder cannot be written.
-    """
-    source = source_of(model, error, frames)
-    source.write(folder)
-    return source
-
-
-def source_of(
-    model: Model, error: float | None = None, frames: int | None = None
-) -> Source:
-    """A model's C, as `write` writes it."""
-    for reason in lacks(model.info):
-        raise InputError(f"{model.path}: cannot be written in C, as {reason}")
-    last = len(model.decision_points_s) - 1
-    points = range(last if error is None else 0, last + 1)
-    frames = frames or ceil(model.info.window_s * RATE_HZ) + 4
-    source = Source(model.info, points, frames)
-    graph = CompiledGraph(model, points, model.info.width + source.features())
-    source.kernels()
-    source.skin()
-    source.geometry()
-    source.graph(graph)
-    source.tasks(graph.places, {} if error is None else stopping_rules(model, error))
-    source.limits()
-    windows_s = [model.decision_points_s[point] for point in points]
-    source.constant("double ec_windows_s[]", windows_s)
-    source.define(POINTS=len(points), EARLY=error is not None)
-    return source
-
-
 def export(
     model: Model,
     folder: str | os.PathLike[str],
-    error: float | None,
-    flash_kb: int | None,
+    error: float | None = None,
+    flash_kb: int | None = None,
 ) -> str:
     """Write a model's C, and say how large it is, and what was left out for that.
 
     Args:
         model: the model.
         folder: that is made.
-        error: as for `write`.
-        flash_kb: kilobytes that tables and code may take.
+        error: the accepted share of wrong decisions, for early ones; None decides at
+            the full window, and leaves out the tables of the other decision points.
+        flash_kb: kilobytes that tables and code may take. What does not fit leaves out
+            early decisions first, then novelty.
 
     Raises:
-        InputError: as `write`; or it is larger even without early decisions.
+        InputError: C lacks something that the model needs, the error rate is not
+            certified, the least that can be written is larger than `flash_kb`, or the
+            folder cannot be written.
     """
     left_out = ""
-    source = source_of(model, error)
+    source = Source(model, error)
     limit = 1024 * flash_kb if flash_kb else source.flash
     if source.flash > limit and error is not None:
-        left_out = "; early decisions are left out to fit --flash"
-        source = source_of(model)
+        left_out += "; early decisions are left out to fit --flash"
+        source = Source(model)
+    if source.flash > limit and model.info.novelty is not None:
+        left_out += (
+            "; novelty is left out to fit --flash: nothing is unusual or unknown, and "
+            "confidence is that of a usual touch"
+        )
+        source = Source(model, doubts=False)
     if source.flash > limit:
         raise InputError(
             f"{model.path}: takes {source.flash / 1024:.0f} kB of flash in C, above "
@@ -135,50 +99,70 @@ def export(
 
 
 class Source:
-    """Definitions of a model in C.
+    """A model in C.
 
     Attributes:
-        defines: lines of `model.h`.
-        constants: lines of `model.c`.
+        values: what stands for the names in the rooms' `model.h` and `model.c`.
         flash: bytes of code and tables.
         ram: bytes.
         work: instructions of a decision on a Cortex-M4F, about.
     """
 
-    def __init__(self, info: ModelInfo, points: Sequence[int], frames: int) -> None:
-        self.defines: list[str] = []
-        self.constants: list[str] = []
+    def __init__(
+        self, model: Model, error: float | None = None, doubts: bool = True
+    ) -> None:
+        """Make all values.
+
+        Args:
+            model: the model.
+            error: as for `export`.
+            doubts: with novelty and remoteness.
+
+        Raises:
+            InputError: as `export`.
+        """
+        for reason in lacks(model.info):
+            raise InputError(f"{model.path}: cannot be written in C, as {reason}")
+        self._info = model.info
+        self._layout = model.info.layout
+        self._types = feature_types(model.info.features)
+        self._frames = ceil(model.info.window_s * RATE_HZ) + 4
+        windows_s = model.decision_points_s
+        self._last = len(windows_s) if error is not None else 1
+        self.values: dict[str, object] = {
+            "early": error is not None,
+            "windows_s": windows_s[-self._last :],
+        }
+        for owner, names in ((self._layout, OF_LAYOUT), (self._info, OF_INFO)):
+            self.values |= {name: getattr(owner, name) or 0 for name in names}
         self.flash = CODE_BYTES
         self.ram = 0
         self.work = 0
-        self._info = info
-        self._layout = info.layout
-        self._types = feature_types(info.features)
-        self._points = points
-        self._frames = frames
+        outputs = set(model.outputs) - set(() if doubts else DOUBTS)
+        points = range(len(windows_s))[-self._last :]
+        room = self._info.width + self._features()
+        graph = CompiledGraph(model, outputs, points, room)
+        self._kernels()
+        self._skin()
+        self._geometry()
+        self._graph(graph)
+        rules = {} if error is None else stopping_rules(model, error)
+        self._tasks(graph.places, rules)
+        self._limits(doubts)
 
     def write(self, folder: str | os.PathLike[str]) -> None:
         """Write all files, each whole or not at all."""
-        defines = "\n".join(self.defines)
-        constants = "\n".join(self.constants)
-        header = f"#ifndef EC_MODEL_H\n#define EC_MODEL_H\n{defines}\n#endif\n"
-        texts = {file.name: file.read_text() for file in ROOMS.iterdir()}
-        texts["model.h"] = header
-        texts["model.c"] = f'#include "internal.h"\n\n{constants}\n'
-        for name, text in texts.items():
-            with write_whole(Path(folder) / name) as file:
+        values = {}
+        for name, value in self.values.items():
+            values[name] = literal(value)
+            if isinstance(value, Sized):
+                values[f"{name}_count"] = str(len(value))
+        for room in ROOMS.iterdir():
+            text = string.Template(room.read_text()).substitute(values)
+            with write_whole(Path(folder) / room.name) as file:
                 file.write(text.encode())
 
-    def define(self, **values: object) -> None:
-        """Constants of the preprocessor."""
-        for name, value in values.items():
-            self.defines.append(f"#define EC_{name} {literal(value)}")
-
-    def constant(self, declaration: str, values: Iterable[object]) -> None:
-        """A constant array or structure."""
-        self.constants.append(f"const {declaration} = {literal(values)};")
-
-    def features(self) -> int:
+    def _features(self) -> int:
         """The features; how many doubles they are measured in."""
         rows = []
         largest = 0
@@ -189,8 +173,7 @@ class Source:
                 count = width
                 largest = max(largest, count * samples)
             rows.append(self._feature(feature, samples, count))
-        self.define(FEATURES=len(rows))
-        self.constant("ec_feature ec_features[]", rows)
+        self.values["features"] = rows
         return largest + (len(measures.QUANTITIES) + 4) * self._frames
 
     def _feature(self, feature: Feature, samples: int, rows: int) -> list[object]:
@@ -199,7 +182,7 @@ class Source:
         of_region = "REGION_" * (alone and feature.zone == "contact")
         kinds = [f"EC_T_{kind.upper()}" for kind in feature.transforms]
         return [
-            float(transforms.floor_of(feature, self._layout)),
+            transforms.floor_of(feature, self._layout),
             samples,
             rows,
             "EC_NO_ZONE" if alone else f"EC_{feature.zone.upper()}",
@@ -208,7 +191,7 @@ class Source:
             f"EC_S_{feature.summary.upper()}",
         ]
 
-    def kernels(self) -> None:
+    def _kernels(self) -> None:
         """The tables of the features that are made of kernels."""
         for name in ("taxel_kernels", "zone_kernels"):
             table = self._info.kernels.get(name, KernelTable((), ()))
@@ -221,9 +204,9 @@ class Source:
                 array("uint8_t", flat),
                 BIASES.get(len(table.biases), ()),
             ]
-            self.constant(f"ec_kernels ec_{name}", fields)
+            self.values[name] = fields
 
-    def skin(self) -> None:
+    def _skin(self) -> None:
         """The skin, and what is measured in every frame."""
         layout = self._layout
         quantities = {feature.quantity for feature in self._types}
@@ -238,52 +221,42 @@ class Source:
         self.ram += self._frames * row + 8 * layout.alive.size + 2048
         self.work += (12000 if spreads else 4000) * self._frames * len(zones)
         self.work += 2500 * self._info.width
-        self.define(
-            FRAMES=self._frames,
-            ZONES=len(zones),
-            CELLS=pooled,
-            KERNEL_CELLS=pooled_for_kernels,
-            MOTION="motion" in quantities,
-            SPREADS=spreads,
-            FORCE_MOTION=not quantities.isdisjoint(("force_motion", "stiffness")),
-        )
-        zone_names = [f"EC_{name.upper()}" for name in (*zones, "no_zone")]
-        self.constant("uint8_t ec_zone_names[]", zone_names)
-        self.constant("int16_t ec_cell_of_taxel[]", _of_taxels(layout, cells))
-        numbers = _of_taxels(layout, kernel_cells)
-        self.constant("int16_t ec_kernel_cell_of_taxel[]", numbers)
+        self.values |= {
+            "frames": self._frames,
+            "cells": pooled,
+            "kernel_cells": pooled_for_kernels,
+            "motion": "motion" in quantities,
+            "spreads": spreads,
+            "force_motion": not quantities.isdisjoint(("force_motion", "stiffness")),
+            "zone_names": [f"EC_{name.upper()}" for name in (*zones, "no_zone")],
+            "cell_of_taxel": _of_taxels(layout, cells),
+            "kernel_cell_of_taxel": _of_taxels(layout, kernel_cells),
+        }
 
-    def geometry(self) -> None:
+    def _geometry(self) -> None:
         """Where the taxels lie, on which arm, and the scale of their counts."""
         layout = self._layout
-        for owner, names in ((layout, OF_LAYOUT), (self._info, OF_INFO)):
-            for name in names:
-                self.define(**{name.upper(): getattr(owner, name) or 0})
         along, around = layout.pitch
         angles = layout.column_angles_deg or (0.0,)
-        steps = [
-            (b - a + 180.0) % 360.0 - 180.0 for a, b in pairwise([*angles, angles[0]])
-        ]
+        steps = (np.diff([*angles, angles[0]]) + 180.0) % 360.0 - 180.0
         links = []
         for kind, axis, step, after in (
             self._info.chain.links if self._info.chain else ()
         ):
-            name = {"fixed": "FIXED", "prismatic": "PRISMATIC"}.get(kind, "REVOLUTE")
-            links.append([axis, np.ravel(step), after, f"EC_{name}"])
-        self.define(
-            ALONG=float(along),
-            AROUND=float(around),
-            SCALE=float(layout.counts_per_newton or 1.0),
-            FORCE_FLOOR=float(transforms.force_floor(layout)),
-            LENGTH_FLOOR=float(transforms.length_floor(layout)),
-            COLUMN_ANGLES=len(angles) > 1,
-            LINKS=len(links),
-        )
-        self.constant("bool ec_alive[]", layout.alive.reshape(-1))
-        self.constant("ec_angle ec_angles[]", zip(angles, steps, strict=True))
-        self.constant("ec_link ec_links[]", links)
+            links.append([axis, np.ravel(step), after, f"EC_{kind.upper()}"])
+        self.values |= {
+            "along": along,
+            "around": around,
+            "scale": float(layout.counts_per_newton or 1.0),
+            "force_floor": transforms.force_floor(layout),
+            "length_floor": transforms.length_floor(layout),
+            "column_angles": len(angles) > 1,
+            "alive": layout.alive.reshape(-1),
+            "angles": zip(angles, steps, strict=True),
+            "links": links,
+        }
 
-    def graph(self, graph: CompiledGraph) -> None:
+    def _graph(self, graph: CompiledGraph) -> None:
         """The steps and the tables of the graph."""
         tables = []
         for table in graph.tables:
@@ -292,18 +265,14 @@ class Source:
             stride = (table.ndim - 1) * table.shape[-1]
             tables.append([values, stride, f"EC_{kind.upper()}"])
             self.flash += table.nbytes
-        steps = []
-        for s in graph.steps:
-            steps.append([f"EC_{s.operator.upper()}", s.inputs, s.outputs, s.sizes])
-            is_product = s.operator == "Gemm"
-            self.work += 16 * prod(s.sizes[:2]) if is_product else 400 * max(s.sizes)
-        self.flash += 44 * len(steps)
+        for step in graph.steps:
+            is_product = step.operator in ("EC_GEMM", "EC_MATMUL")
+            self.work += 16 * prod(step.sizes) if is_product else 400 * max(step.sizes)
+        self.flash += 44 * len(graph.steps)
         self.ram += 8 * graph.arena
-        self.define(ARENA=graph.arena, STEPS=len(steps))
-        self.constant("ec_table ec_tables[]", tables)
-        self.constant("ec_step ec_steps[]", steps)
+        self.values |= {"arena": graph.arena, "tables": tables, "steps": graph.steps}
 
-    def tasks(
+    def _tasks(
         self, places: Mapping[str, int], rules: Mapping[str, StoppingRule | None]
     ) -> None:
         """The tasks, their labels and their calibration."""
@@ -326,43 +295,48 @@ class Source:
             ]
             rows.append(row)
             labels.append(array("char *const", map(quoted, task.labels)))
-        most = max(len(task.labels) for task in tasks.values())
-        self.define(TASKS=len(names), MOST_LABELS=most)
-        for output in ("out_of_range", "novelty", "remoteness"):
-            self.define(**{f"PLACE_{output.upper()}": places.get(output, 0)})
         order = sorted(range(len(names)), key=lambda i: bool(tasks[names[i]].factors))
-        self.constant("ec_task ec_tasks[]", rows)
-        self.constant("uint8_t ec_order[]", order)
-        self.constant("char *const *const ec_labels[]", labels)
-        self.constant("char *const ec_task_names[]", map(quoted, names))
+        self.values |= {f"place_{name}": places.get(name, 0) for name in FLAGS}
+        self.values |= {
+            "most_labels": max(len(task.labels) for task in tasks.values()),
+            "tasks": rows,
+            "order": order,
+            "labels": labels,
+            "task_names": map(quoted, names),
+        }
 
     def _curves(self, task: str) -> list[object]:
         """The curves of a task: those of the decision points, and that of the rules."""
         stopping = self._info.stopping.get(task)
         if stopping is None:
-            return [0, ()]
-        columns = stopping.slopes, stopping.intercepts, stopping.doubts
-        curves = [[column[point] for column in columns] for point in self._points]
+            return [0, (0, 0, 0)]
+        curves = zip(stopping.slopes, stopping.intercepts, stopping.doubts, strict=True)
         rules = stopping.slope, stopping.intercept, stopping.doubt
-        return [array("ec_curve", curves), rules]
+        return [array("ec_curve", [*curves][-self._last :]), rules]
 
-    def limits(self) -> None:
-        """The limits of novelty and remoteness at the decision points."""
+    def _limits(self, doubts: bool) -> None:
+        """The limits of novelty and remoteness at the decision points; without doubts
+        no score is beyond them."""
         info = self._info
+        novelty = info.novelty or Novelty((), ())
+        far = Remoteness((), (), ())
         naming = 255
-        limits: dict[str, Any] = {}
-        if info.novelty is not None:
-            limits = {"typical": info.novelty.typical, "novel": info.novelty.limits}
-        for i, name in enumerate(info.tasks):
+        if not doubts:
+            novelty = Novelty((inf,) * self._last, (inf,) * self._last)
+        for i, name in enumerate(info.tasks if doubts else ()):
             stopping = info.stopping.get(name)
             if stopping is not None and stopping.remoteness is not None:
                 naming = i
                 far = stopping.remoteness
-                limits |= vars(far) | {"remote": far.limits}
-        for name in ("typical", "novel", "remote", "middles", "slopes"):
-            values = [limits[name][point] for point in self._points if name in limits]
-            self.constant(f"double ec_{name}[]", values)
-        self.define(NAMING=naming, CALIBRATED=info.novelty is not None)
+        limits = {
+            "typical": novelty.typical,
+            "novel": novelty.limits,
+            "remote": far.limits,
+            "middles": far.middles,
+            "slopes": far.slopes,
+        }
+        self.values |= {key: limit[-self._last :] for key, limit in limits.items()}
+        self.values |= {"naming": naming, "calibrated": info.novelty is not None}
 
 
 def literal(value: object) -> str:
@@ -375,7 +349,7 @@ def literal(value: object) -> str:
         return str(int(value))  # type: ignore[call-overload]
     if np.isinf(value):
         return "(double)INFINITY"
-    return float(value).hex() + "f" * isinstance(value, np.float32)
+    return float(value).hex()
 
 
 def array(kind: str, values: Iterable[object]) -> str:
@@ -385,22 +359,20 @@ def array(kind: str, values: Iterable[object]) -> str:
 
 def quoted(text: str) -> str:
     """A text as a literal of C: ASCII, and other bytes of UTF-8 by their numbers."""
-    plain = set(string.ascii_letters + string.digits + " -_.,:;()/+").__contains__
-    codes = (chr(b) if plain(chr(b)) else f"\\{b:03o}" for b in text.encode())
-    return '"' + "".join(codes) + '"'
+    letters = text.encode().decode("latin-1")
+    return '"' + OTHERS.sub(lambda other: f"\\{ord(other[0]):03o}", letters) + '"'
 
 
 def lacks(info: ModelInfo) -> Iterable[str]:
     """What C lacks for a model, as sentences."""
     layout = info.layout
-    types = feature_types(info.features)
-    if layout.axes or any(f.quantity in measures.SHEAR for f in types):
+    if layout.axes:
         yield "it takes no shear"
     total = layout.rows * layout.cols * 65535
     if (total * max(2 * layout.cols, layout.rows)) ** 2 >= LARGEST:
         yield f"the sums of {layout.rows} x {layout.cols} taxels exceed 64 bits"
-    for feature in types:
-        summed = feature.summary in ("mean", "deviation", "roughness")
+    for feature in feature_types(info.features):
+        summed = feature.summary not in ("", "rate")
         if summed and (feature.samples or info.samples) > MOST_SUMMED:
             yield f"{feature.name} sums up more than {MOST_SUMMED} samples"
 
@@ -408,6 +380,7 @@ def lacks(info: ModelInfo) -> Iterable[str]:
 def _of_taxels(layout: SkinLayout, cells: Cells) -> Array:
     """(taxels,) the cell that each belongs to; -1 where it has no living taxel."""
     rows, cols = np.indices(layout.shape) // cells.side
-    blocks = (rows * layout.cols + cols).reshape(-1)
-    living = np.unique(blocks[layout.alive.reshape(-1)])
-    return np.where(np.isin(blocks, living), living.searchsorted(blocks), -1)
+    blocks = rows * layout.cols + cols
+    living = np.unique(blocks[layout.alive])
+    cell_of_block = living.searchsorted(blocks)
+    return np.where(np.isin(blocks, living), cell_of_block, -1).ravel()

@@ -3,26 +3,20 @@ and the decision point alone is computed here."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Sequence, Set
 from math import prod
+from typing import NamedTuple
 
 import numpy as np
 
-from edge.arrays import Array, Floats
+from edge.arrays import Array
 from edge.errors import InputError
 from edge.model.graph import Graph
 from edge.model.model import Model
 from edge.model.onnx_file import Node
+from export.build import smallest
 
-ELEMENT_WISE = "Add Sub Mul Div Max LessOrEqual Where Clip Round Sqrt".split()
-NAMES = {
-    "MatMul": "Gemm",
-    "GatherElements": "Gather",
-    "GatherND": "Gather",
-    "Squeeze": "Max",
-}
-"""{operator: that of C}; the larger of a value and itself is a copy."""
+ELEMENT_WISE = "Add Sub Mul Div Max LessOrEqual Where Clip Round Sqrt Squeeze".split()
 TYPES = {
     "int8": "int8_t",
     "int16": "int16_t",
@@ -33,12 +27,11 @@ TYPES = {
 """{type of a table: that in C}, from the smallest."""
 
 
-@dataclass(frozen=True)
-class Step:
+class Step(NamedTuple):
     """A node; see `ec_step` in `export/c/internal.h`.
 
     Attributes:
-        operator: of ONNX.
+        operator: its name in C.
         inputs, outputs: places in the arena, or behind it numbers of tables.
         sizes: as the operator's function in `export/c/graph.c` takes them.
     """
@@ -59,11 +52,14 @@ class CompiledGraph:
         places: {output: its place in the arena}.
     """
 
-    def __init__(self, model: Model, points: Sequence[int], arena: int) -> None:
+    def __init__(
+        self, model: Model, outputs: Set[str], points: Sequence[int], arena: int
+    ) -> None:
         """Compile.
 
         Args:
             model: whose graph it is.
+            outputs: that are kept.
             points: the decision points that are kept.
             arena: the least size of the arena.
 
@@ -75,7 +71,6 @@ class CompiledGraph:
         self.places = {"features": 0}
         self._numbers: dict[tuple[tuple[int, ...], bytes], int] = {}
         graph = Graph(model.contents)
-        self._makers = graph.makers
         self._values = []
         for point in points:
             inputs = {
@@ -89,30 +84,19 @@ class CompiledGraph:
         for node in model.contents.nodes:
             if not self._variable.isdisjoint(node.inputs):
                 self._variable.update(node.outputs)
-        outputs = list(model.outputs)
-        ordered: dict[str, Node] = {}
-        for output in outputs:
-            self._collect(output, ordered)
-        nodes = list(ordered.values())
+        needed = set(outputs)
+        nodes: list[Node] = []
+        for node in reversed(model.contents.nodes):
+            if not needed.isdisjoint(self._variable.intersection(node.outputs)):
+                needed.update(self._inputs(node))
+                nodes.insert(0, node)
         self._place(nodes, outputs)
-        self.steps = [step for node in nodes for step in self._steps(node)]
-
-    def _collect(self, name: str, nodes: dict[str, Node]) -> None:
-        """Add the nodes that make a value, by their first output.
-
-        One output comes after another, so that few values are kept at once.
-        """
-        if name in self._variable - {"features"}:
-            node = self._makers[name]
-            if node.outputs[0] not in nodes:
-                for source in self._inputs(node):
-                    self._collect(source, nodes)
-                nodes[node.outputs[0]] = node
+        self.steps = list(map(self._step, nodes))
 
     def _shape(self, name: str) -> tuple[int, ...]:
         return self._values[0][name].shape
 
-    def _place(self, nodes: Sequence[Node], outputs: Sequence[str]) -> None:
+    def _place(self, nodes: Sequence[Node], outputs: Iterable[str]) -> None:
         """Give each value a place in the arena, from its first use to its last."""
         last = {}
         for i, node in enumerate(nodes):
@@ -122,70 +106,54 @@ class CompiledGraph:
         for i, node in enumerate(nodes):
             for name in node.outputs:
                 size = prod(self._shape(name))
-                begin = _gap(taken.values(), size)
+                begin = 0
+                for low, high in sorted(taken.values()):
+                    if low < begin + size:
+                        begin = max(begin, high)
                 taken[name] = begin, begin + size
                 self.places[name] = begin
                 self.arena = max(self.arena, begin + size)
             taken = {name: span for name, span in taken.items() if last[name] > i}
 
-    def _steps(self, node: Node) -> Iterator[Step]:
-        """The steps of a node: several of a `Max`."""
+    def _step(self, node: Node) -> Step:
+        """The step of a node."""
         names = self._inputs(node)
-        operator = NAMES.get(node.operator, node.operator)
-        if operator == "Where" and len(names) == 2:
-            operator = "Max"
+        operator = node.operator
+        if operator == "Where" and len(names) == 1:
+            operator = "Squeeze"
         inputs = list(map(self._operand, names))
         outputs = [self.places[name] for name in node.outputs]
         sizes = self._sizes(node, operator)
-        if operator != "Max":
-            yield Step(operator, inputs, outputs, sizes)
-            return
-        for place in inputs[1:]:
-            yield Step(operator, [inputs[0], place], outputs, sizes[:3])
-            inputs[0] = outputs[0]
+        return Step(f"EC_{operator.upper()}", inputs, outputs, sizes)
 
     def _inputs(self, node: Node) -> list[str]:
-        """The inputs without those that say which axes; of a copy its input twice."""
-        if node.operator == "Squeeze":
-            return node.inputs[:1] * 2
+        """The inputs; one alone of a `Where` that chooses the same at all points."""
         if node.operator == "Where" and node.inputs[0] not in self._variable:
             conditions = np.array([at[node.inputs[0]] for at in self._values])
             if conditions.all():
-                return node.inputs[1:2] * 2
+                return node.inputs[1:2]
             if not conditions.any():
-                return node.inputs[2:] * 2
-        if node.operator == "TopK" or node.operator.startswith("Reduce"):
-            return node.inputs[:1]
-        return node.inputs[::2] if node.operator == "Pad" else node.inputs
+                return node.inputs[2:]
+        return node.inputs
 
     def _sizes(self, node: Node, operator: str) -> list[int]:
         """The sizes of a step."""
-        shape = self._shape(node.inputs[0])
         size = prod(self._shape(node.outputs[0]))
         if operator in ELEMENT_WISE:
-            names = self._inputs(node)
-            return [size, *(self._broadcast(name, size) for name in names)]
-        if operator == "Gemm":
-            return [*self._shape(node.inputs[1]), len(node.inputs) - 2]
-        if operator == "TopK":
-            rows = prod(shape[:-1])
-            return [rows, shape[-1], size // rows]
-        if operator in ("Pad", "ArgMax"):
-            return [prod(shape)]
-        axis = node.attributes.get("axis", 0)
-        if node.operator in ("GatherElements", "GatherND"):
-            axis = len(shape) - 1
-        elif operator != "Gather":
+            counts = [prod(self._shape(name)) for name in self._inputs(node)]
+            is_long = operator == "Max" and len(counts) > 2
+            if is_long or not {1, size}.issuperset(counts):
+                raise InputError(f"C cannot combine {counts} numbers; export it again")
+            return [size, *counts]
+        shape = self._shape(node.inputs[0])
+        axis = len(shape) - 1
+        if node.operator == "Gather":
+            axis = node.attributes.get("axis", 0)
+        elif operator.startswith("Reduce"):
             (axis,) = self._values[0][node.inputs[1]].tolist()
-        count = prod(self._shape(node.inputs[1]))
-        return [prod(shape[:axis]), shape[axis], prod(shape[axis + 1 :]), count]
-
-    def _broadcast(self, name: str, size: int) -> int:
-        """How many numbers an element-wise step takes of an input: one, or all."""
-        count = prod(self._shape(name))
-        if count not in (1, size):
-            raise InputError(f"C cannot combine {count} numbers with {size}")
-        return count
+        before = prod(shape[:axis])
+        behind = prod(shape[axis + 1 :])
+        return [before, shape[axis], behind, size // (before * behind)]
 
     def _operand(self, name: str) -> int:
         """The place of a value, or the number of its table."""
@@ -197,25 +165,5 @@ class CompiledGraph:
         key = values.shape, values.tobytes()
         if key not in self._numbers:
             self._numbers[key] = len(self.tables)
-            self.tables.append(table_of(values))
+            self.tables.append(smallest(values, TYPES))
         return self.arena + self._numbers[key]
-
-
-def table_of(values: Floats) -> Array:
-    """Numbers in the smallest type that holds them exactly."""
-    for kind in TYPES:
-        with np.errstate(all="ignore"):
-            small = values.astype(kind)
-        if np.array_equal(small.astype(float), values):
-            return small
-    raise InputError("a constant of the graph is not a number")
-
-
-def _gap(taken: Iterable[tuple[int, int]], size: int) -> int:
-    """The first place with room for some numbers."""
-    place = 0
-    for begin, end in sorted(taken):
-        if begin - place >= size:
-            break
-        place = max(place, end)
-    return place

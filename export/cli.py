@@ -7,7 +7,9 @@ import os
 import sys
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
+import numpy as np
 from joblib import cpu_count
 
 from edge.classifier import suited
@@ -48,6 +50,141 @@ LONGEST_S = 60.0
 """Longest window, and longest time that a contact may be away."""
 count = within(int, 1, 1_000_000)
 """The type of an option that takes a number of things."""
+OPTIONS: dict[str, dict[str, Any]] = {
+    # The recordings, the model and its tasks, and the settings that can be held fixed.
+    "--data": {
+        "nargs": "+",
+        "required": True,
+        "metavar": "REC",
+        "help": ".npz recordings or folders",
+    },
+    "--out": {
+        "type": Path,
+        "default": Path("build"),
+        "help": "folder (default: %(default)s)",
+    },
+    "--name": {
+        "help": "of the model (default: that of the folder of the recordings)",
+    },
+    "--tasks": {
+        "nargs": "+",
+        "metavar": "TASK",
+        "help": "only these keys of the labels",
+    },
+    "--features": {
+        "nargs": "+",
+        "metavar": "NAME",
+        "help": f"the features to measure, instead of a choice: sets ({', '.join(SETS)}) and "
+        f"single features, ZONE_QUANTITY of {', '.join(measures.ZONES)} and "
+        f"{', '.join(measures.QUANTITIES)}, or {', '.join(measures.ALONE)}",
+    },
+    "--projection": {
+        "choices": KINDS,
+        "help": "fix the projection: principal components or discriminants",
+    },
+    "--samples": {
+        "type": within(int, 2, 1000),
+        "default": SAMPLES,
+        "help": "values of each feature (default: %(default)s)",
+    },
+    "--scaling": {
+        "choices": SCALINGS,
+        "help": "fix the scaling (paper, Eqs. 1 to 5)",
+    },
+    "--components": {
+        "type": count,
+        "help": "fix the number of principal components",
+    },
+    "-k --k": {
+        "type": count,
+        "help": "fix the number of neighbours",
+    },
+    # How the others are chosen, and at which times.
+    "--leave-out": {
+        "default": LEAVE_OUT,
+        "metavar": "KEY",
+        "help": "choose and score a task with entire groups of this label held out, if each of its "
+        f"classes has several groups (default: {LEAVE_OUT}); `{TRIAL}` leaves out "
+        "single trials",
+    },
+    "--quick": {
+        "action": "store_true",
+        "help": "for a first look: few candidates, five folds",
+    },
+    "--window": {
+        "type": within(float, 0.01, LONGEST_S),
+        "help": "seconds from onset that a decision is based on (default: "
+        f"{WINDOW_S:g}, or more if touches last longer and a longer window is much more "
+        "accurate)",
+    },
+    "--decision-points": {
+        "metavar": "A:B:STEP",
+        "help": "calibrate decisions before the full window (edge-classify run --error), at these "
+        "seconds from onset, or at a list a,b,c, or `none` (default: "
+        f"{DECISION_POINTS} with {FEWEST} to {MOST_TRIALS} trials, and fewer points if "
+        "the model would exceed 1.9 MB)",
+    },
+    "--threshold": {
+        "type": within(int, 0, 65534),
+        "help": "counts above which a taxel is in contact",
+    },
+    "--onset": {
+        "type": within(int, 0, 65534),
+        "help": "counts above which a contact begins",
+    },
+    "--release": {
+        "type": within(float, 0.01, LONGEST_S),
+        "help": "seconds that a contact may be away and go on (default: the skin's, or longer "
+        "if many touches are felt in pieces and that is much more accurate)",
+    },
+    # The point of `make tradeoff`, the arm, and the files that are written or scored.
+    "--front": {
+        "metavar": "WHAT",
+        "help": "the choice at the window of a point of `make tradeoff`: fast, balanced, "
+        "accurate, milliseconds to decide within, or an accuracy (0 to 1) to reach",
+    },
+    "--fronts": {
+        "type": Path,
+        "metavar": "front.json",
+        "default": Path("build/tradeoff/front.json"),
+        "help": "the file with the points (default: %(default)s)",
+    },
+    "--report": {
+        "action": "store_true",
+        "help": "also write OUT/report.html, as `make export` does",
+    },
+    "--test": {
+        "nargs": "+",
+        "metavar": "REC",
+        "help": "recordings that are scored and never fitted, such as those of another day",
+    },
+    "--compare": {
+        "metavar": "old.onnx",
+        "help": "a former model.onnx, which is scored on the --test recordings too",
+    },
+    "--jobs": {
+        "type": count,
+        "default": cpu_count(),
+        "help": "processes (default: all cores)",
+    },
+    # The model in C.
+    "--c": {
+        "type": Path,
+        "metavar": "DIR",
+        "help": "also write the model as C99 for a microcontroller, into this folder",
+    },
+    "--c-error": {
+        "type": within(float, 1e-6, 1.0 - 1e-6),
+        "metavar": "RATE",
+        "help": "with --c: decide early, wrongly at most this often (default: at the full window)",
+    },
+    "--flash": {
+        "type": count,
+        "metavar": "KB",
+        "help": "with --c: kB that it may take; early decisions are left out first",
+    },
+}
+"""{spellings of an option: how argparse takes it}."""
 
 
 def parser() -> argparse.ArgumentParser:
@@ -59,163 +196,11 @@ def parser() -> argparse.ArgumentParser:
         "others are chosen for each task: the smallest model within one standard error "
         "of the best in cross-validation.",
     )
-    _add_settings(top)
-    _add_choice(top)
-    _add_results(top)
-    _add_c(top)
+    for names, settings in OPTIONS.items():
+        top.add_argument(*names.split(), **settings)
+    add_arm(top, "for recordings whose joint angles name no arm (default: Cody's)")
     top.set_defaults(run=run)
     return top
-
-
-def _add_settings(top: argparse.ArgumentParser) -> None:
-    """The recordings, the model and its tasks, and the settings that can be held
-    fixed."""
-    option = top.add_argument
-    option(
-        "--data",
-        nargs="+",
-        required=True,
-        metavar="REC",
-        help=".npz recordings or folders",
-    )
-    option(
-        "--out",
-        type=Path,
-        default=Path("build"),
-        help="folder (default: %(default)s)",
-    )
-    option(
-        "--name", help="of the model (default: that of the folder of the recordings)"
-    )
-    option("--tasks", nargs="+", metavar="TASK", help="only these keys of the labels")
-    option(
-        "--features",
-        nargs="+",
-        metavar="NAME",
-        help=f"the features to measure, instead of a choice: sets ({', '.join(SETS)}) and "
-        f"single features, ZONE_QUANTITY of {', '.join(measures.ZONES)} and "
-        f"{', '.join(measures.QUANTITIES)}, or {', '.join(measures.ALONE)}",
-    )
-    option(
-        "--projection",
-        choices=KINDS,
-        help="fix the projection: principal components or discriminants",
-    )
-    option(
-        "--samples",
-        type=within(int, 2, 1000),
-        default=SAMPLES,
-        help="values of each feature (default: %(default)s)",
-    )
-    option("--scaling", choices=SCALINGS, help="fix the scaling (paper, Eqs. 1 to 5)")
-    option("--components", type=count, help="fix the number of principal components")
-    option("-k", "--k", type=count, help="fix the number of neighbours")
-
-
-def _add_choice(top: argparse.ArgumentParser) -> None:
-    """How the others are chosen, and at which times."""
-    option = top.add_argument
-    option(
-        "--leave-out",
-        default=LEAVE_OUT,
-        metavar="KEY",
-        help="choose and score a task with entire groups of this label held out, if each of its "
-        f"classes has several groups (default: {LEAVE_OUT}); `{TRIAL}` leaves out "
-        "single trials",
-    )
-    option(
-        "--quick",
-        action="store_true",
-        help="for a first look: few candidates, five folds",
-    )
-    option(
-        "--window",
-        type=within(float, 0.01, LONGEST_S),
-        help=f"seconds from onset that a decision is based on (default: {WINDOW_S:g}, or more if "
-        "touches last longer and a longer window is much more accurate)",
-    )
-    option(
-        "--decision-points",
-        metavar="A:B:STEP",
-        help="calibrate decisions before the full window (edge-classify run --error), at these "
-        "seconds from onset, or at a list a,b,c, or `none` (default: "
-        f"{DECISION_POINTS} with {FEWEST} to {MOST_TRIALS} trials, and fewer points if "
-        "the model would exceed 1.9 MB)",
-    )
-    counts = within(int, 0, 65534)
-    option("--threshold", type=counts, help="counts above which a taxel is in contact")
-    option("--onset", type=counts, help="counts above which a contact begins")
-    option(
-        "--release",
-        type=within(float, 0.01, LONGEST_S),
-        help="seconds that a contact may be away and go on (default: the skin's, or longer "
-        "if many touches are felt in pieces and that is much more accurate)",
-    )
-
-
-def _add_results(top: argparse.ArgumentParser) -> None:
-    """The point of `make tradeoff`, the arm, and the files that are written or
-    scored."""
-    option = top.add_argument
-    option(
-        "--front",
-        metavar="WHAT",
-        help="the choice at the window of a point of `make tradeoff`: fast, balanced, "
-        "accurate, milliseconds to decide within, or an accuracy (0 to 1) to reach",
-    )
-    option(
-        "--fronts",
-        type=Path,
-        metavar="front.json",
-        default=Path("build/tradeoff/front.json"),
-        help="the file with the points (default: %(default)s)",
-    )
-    add_arm(top, "for recordings whose joint angles name no arm (default: Cody's)")
-    option(
-        "--report",
-        action="store_true",
-        help="also write OUT/report.html, as `make export` does",
-    )
-    option(
-        "--test",
-        nargs="+",
-        metavar="REC",
-        help="recordings that are scored and never fitted, such as those of another day",
-    )
-    option(
-        "--compare",
-        metavar="old.onnx",
-        help="a former model.onnx, which is scored on the --test recordings too",
-    )
-    option(
-        "--jobs",
-        type=count,
-        default=cpu_count(),
-        help="processes (default: all cores)",
-    )
-
-
-def _add_c(top: argparse.ArgumentParser) -> None:
-    """The model in C."""
-    option = top.add_argument
-    option(
-        "--c",
-        type=Path,
-        metavar="DIR",
-        help="also write the model as C99 for a microcontroller, into this folder",
-    )
-    option(
-        "--c-error",
-        type=within(float, 1e-6, 1.0 - 1e-6),
-        metavar="RATE",
-        help="with --c: decide early, wrongly at most this often (default: at the full window)",
-    )
-    option(
-        "--flash",
-        type=count,
-        metavar="KB",
-        help="with --c: kB that it may take; early decisions are left out first",
-    )
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -280,8 +265,6 @@ def _check_apart(data: list[str], held_out: Sequence[Path]) -> None:
     Raises:
         InputError: one of them is in the data too.
     """
-    if not held_out:
-        return
     # Unlike Path.resolve, this raises nothing for a link to itself.
     fitted = set(map(os.path.realpath, find(data)))
     for file in held_out:
@@ -390,8 +373,8 @@ def _rising(text: str) -> list[float]:
     first, last, step = map(float, text.split(":"))
     if not (0.0 < first <= last <= LONGEST_S and step >= 0.01):
         raise ValueError
-    count = int((last - first) / step + 1e-9) + 1
-    return [round(first + i * step, 9) for i in range(count)]
+    points: list[float] = np.arange(first, last + 1e-9, step).round(9).tolist()
+    return points
 
 
 def main(argv: Sequence[str] | None = None) -> int:

@@ -44,7 +44,7 @@ static void carried(const double *joints, double p[3]) {
     if (link->kind == EC_PRISMATIC) {
       double travel = joints[--moving];
       for (uint32_t i = 0; i < 3; i++) p[i] = p[i] + k[i] * travel;
-    } else if (link->kind == EC_REVOLUTE) {
+    } else if (link->kind != EC_FIXED) {
       double angle = joints[--moving];
       double half = ec_sin(0.5 * angle);
       double f = ec_sin(angle);

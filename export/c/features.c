@@ -220,12 +220,12 @@ static void block(const ec_feature *feature, double window_s, double *out) {
 #define SAMPLES 40
 #define BITS 14
 
-/* A channel, held between frames, times a power of two and cut off. */
+/* A channel, held between frames, times a power of two and cut off. No sum of a skin that export
+   accepts reaches 2^48, so that the product fits. */
 static int32_t channel(const ec_kernels *kernels, const ec_row *row, uint32_t index) {
   int64_t x = row->kernel_cells[kernels == &ec_zone_kernels ? 0 : index];
   if (kernels == &ec_zone_kernels) x = row->zones[index / EC_ZONE_WIDTH][index % EC_ZONE_WIDTH];
   int8_t shift = kernels->shifts[index];
-  if (x > (int64_t)1 << 48) x = (int64_t)1 << 48;
   x = shift > 0 ? x * ((int64_t)1 << shift) : x >> -shift;
   return (int32_t)(x < (1 << BITS) - 1 ? x : (1 << BITS) - 1);
 }

@@ -6,6 +6,10 @@ double ec_arena[EC_ARENA];
 
 static uint32_t now; /* the decision point */
 
+/* Sizes of a step that goes along an axis: before it, along it and behind it, and how many numbers
+   it makes of those along it. */
+enum { BEFORE, ALONG, BEHIND, COUNT };
+
 typedef struct {
   const double *values; /* NULL of a table */
   const ec_table *table;
@@ -33,7 +37,7 @@ static double at(operand x, uint32_t i) {
   }
 }
 
-/* sizes: of the output; of the inputs, each as many or 1. */
+/* The sizes are others here: of the output, and of the inputs, each as many or 1. */
 static void element_wise(const ec_step *step) {
   operand a = operand_at(step->inputs[0]);
   operand b = operand_at(step->inputs[1]);
@@ -53,6 +57,7 @@ static void element_wise(const ec_step *step) {
       case EC_WHERE: out[i] = x != 0.0 ? y : z; break;
       case EC_CLIP: out[i] = x < y ? y : x > z ? z : x; break;
       case EC_ROUND: out[i] = ec_rint(x); break;
+      case EC_SQUEEZE: out[i] = x; break;
       default: out[i] = ec_sqrt(x);
     }
   }
@@ -85,30 +90,29 @@ static double whole_sum(const ec_table *matrix, uint32_t n, uint32_t i, uint32_t
   return (double)sum;
 }
 
-/* x (n) times a matrix (n, m), plus m numbers where there is a third input. */
+/* x (n) times a matrix (n, m), plus m numbers of a Gemm. */
 static void gemm(const ec_step *step) {
   operand x = operand_at(step->inputs[0]);
   operand matrix = operand_at(step->inputs[1]);
   operand plus = operand_at(step->inputs[2]);
   double *out = ec_arena + step->outputs[0];
-  uint32_t n = step->sizes[0];
-  uint32_t m = step->sizes[1];
+  uint32_t n = step->sizes[ALONG];
+  uint32_t m = step->sizes[COUNT];
   bool whole = matrix.table && matrix.table->type <= EC_INT32 && are_whole(x, n);
   for (uint32_t j = 0; j < m; j++) {
     double sum = 0.0;
     for (uint32_t i = 0; !whole && i < n; i++) sum += at(x, i) * at(matrix, i * m + j);
     if (whole) sum = whole_sum(matrix.table, n, j, m);
-    out[j] = step->sizes[2] ? sum + at(plus, j) : sum;
+    out[j] = step->operator == EC_GEMM ? sum + at(plus, j) : sum;
   }
 }
 
-/* sizes: before the axis, along it, behind it. */
 static void reduce(const ec_step *step) {
   operand x = operand_at(step->inputs[0]);
   double *out = ec_arena + step->outputs[0];
-  uint32_t along = step->sizes[1];
-  uint32_t behind = step->sizes[2];
-  for (uint32_t i = 0; i < step->sizes[0] * behind; i++) {
+  uint32_t along = step->sizes[ALONG];
+  uint32_t behind = step->sizes[BEHIND];
+  for (uint32_t i = 0; i < step->sizes[BEFORE] * behind; i++) {
     double sum = 0.0;
     for (uint32_t j = 0; j < along; j++) {
       double value = at(x, (i / behind * along + j) * behind + i % behind);
@@ -123,12 +127,12 @@ static void reduce(const ec_step *step) {
 /* The k smallest of each row, in order, and their places; of equal ones the first comes first. */
 static void top_k(const ec_step *step) {
   operand x = operand_at(step->inputs[0]);
-  uint32_t k = step->sizes[2];
-  for (uint32_t row = 0; row < step->sizes[0]; row++) {
+  uint32_t k = step->sizes[COUNT];
+  for (uint32_t row = 0; row < step->sizes[BEFORE]; row++) {
     double *values = ec_arena + step->outputs[0] + row * k;
     double *places = ec_arena + step->outputs[1] + row * k;
     uint32_t count = 0;
-    for (uint32_t i = 0; i < step->sizes[1]; i++) {
+    for (uint32_t i = 0; i < step->sizes[ALONG]; i++) {
       double value = at(x, row * step->sizes[1] + i);
       if (count == k && !(value < values[k - 1])) continue;
       uint32_t place = count < k ? count++ : k - 1;
@@ -142,15 +146,15 @@ static void top_k(const ec_step *step) {
   }
 }
 
-/* sizes: before the axis, along it, behind it; indices. Those below 0 count from the end. */
+/* Indices below 0 count from the end. */
 static void gather(const ec_step *step) {
   operand x = operand_at(step->inputs[0]);
   operand indices = operand_at(step->inputs[1]);
   double *out = ec_arena + step->outputs[0];
-  uint32_t along = step->sizes[1];
-  uint32_t behind = step->sizes[2];
-  for (uint32_t i = 0; i < step->sizes[0]; i++) {
-    for (uint32_t j = 0; j < step->sizes[3]; j++) {
+  uint32_t along = step->sizes[ALONG];
+  uint32_t behind = step->sizes[BEHIND];
+  for (uint32_t i = 0; i < step->sizes[BEFORE]; i++) {
+    for (uint32_t j = 0; j < step->sizes[COUNT]; j++) {
       double index = at(indices, j);
       uint32_t place = (uint32_t)(index < 0.0 ? index + along : index);
       for (uint32_t l = 0; l < behind; l++) *out++ = at(x, (i * along + place) * behind + l);
@@ -161,14 +165,14 @@ static void gather(const ec_step *step) {
 static void pad(const ec_step *step) {
   operand x = operand_at(step->inputs[0]);
   double *out = ec_arena + step->outputs[0];
-  for (uint32_t i = 0; i < step->sizes[0]; i++) out[i] = at(x, i);
-  out[step->sizes[0]] = at(operand_at(step->inputs[1]), 0);
+  for (uint32_t i = 0; i < step->sizes[ALONG]; i++) out[i] = at(x, i);
+  out[step->sizes[ALONG]] = at(operand_at(step->inputs[2]), 0);
 }
 
 static void arg_max(const ec_step *step) {
   operand x = operand_at(step->inputs[0]);
   uint32_t best = 0;
-  for (uint32_t i = 1; i < step->sizes[0]; i++) {
+  for (uint32_t i = 1; i < step->sizes[ALONG]; i++) {
     if (at(x, i) > at(x, best)) best = i;
   }
   ec_arena[step->outputs[0]] = best;
@@ -178,13 +182,16 @@ void ec_graph(uint32_t point) {
   now = point;
   for (const ec_step *step = ec_steps; step < ec_steps + EC_STEPS; step++) {
     switch (step->operator) {
-      case EC_GEMM: gemm(step); break;
+      case EC_GEMM:
+      case EC_MATMUL: gemm(step); break;
       case EC_REDUCEL1:
       case EC_REDUCESUM:
       case EC_REDUCESUMSQUARE:
       case EC_REDUCEMEAN: reduce(step); break;
       case EC_TOPK: top_k(step); break;
-      case EC_GATHER: gather(step); break;
+      case EC_GATHER:
+      case EC_GATHERELEMENTS:
+      case EC_GATHERND: gather(step); break;
       case EC_PAD: pad(step); break;
       case EC_ARGMAX: arg_max(step); break;
       default: element_wise(step);

@@ -93,7 +93,7 @@ def test_every_quantity_from_raw_counts_on_has_the_bits_of_x86(
     assert machine["machine"] == "aarch64"
     sets = {folder.name for folder in elsewhere.sets(tmp_path)}
     assert {name for name, _ in equal} == sets
-    assert {("demo", "series counts"), ("demo", "object_label")} <= equal.keys()
+    assert {("demo", "features"), ("demo", "object_label")} <= equal.keys()
     assert [key for key, is_equal in equal.items() if not is_equal] == []
 
 

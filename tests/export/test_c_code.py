@@ -4,15 +4,19 @@ M33 under QEMU."""
 import shutil
 import subprocess
 from dataclasses import replace
+from itertools import cycle
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from edge import demo
+from edge.elementary import logistic
 from edge.errors import InputError
+from edge.model.info import Novelty, margin
 from edge.model.model import Model
 from edge.recording import Recording, load
+from edge.saving import save
 from edge.skin.decoder import Baseline
 from edge.skin.file import Signal
 from edge.touch import measures
@@ -20,14 +24,17 @@ from edge.touch.feature import KERNELS
 from edge.touch.kernels import KernelTable, channels_of
 from edge.touch.layout import SkinLayout
 from export import c_code
-from export.c_graph import CompiledGraph, table_of
+from export.build import smallest
+from export.c_graph import TYPES, CompiledGraph
 from export.graph import to_onnx
-from tests.conftest import ROOT, ended, export, in_a_row, save_touches, touch
+from tests.conftest import ROOT, ended, export, in_a_row, touch
 from tests.edge.model.test_engines import hostile
 from tests.export.microcontroller import machine
+from tests.export.test_early_stopping import pressed
 from tests.export.test_graph import fit, hard_set
 from tests.hard_cases.models import describe
 from train.model.pipeline import Choice
+from train.model.scaling import SCALINGS
 
 needs_gcc = pytest.mark.skipif(shutil.which("gcc") is None, reason="there is no gcc")
 TOOLS = ("arm-none-eabi-gcc", "qemu-system-arm")
@@ -84,16 +91,45 @@ def recordings_for(layout, count, rng):
                     int
                 )
         t = np.arange(n) / 100.0 + rng.uniform(0, 50)
-        joints = 0.05 * rng.normal(size=(n, 5)).cumsum(axis=0)
+        turns = rng.choice([0.05, 1e4])
+        joints = turns * rng.normal(size=(n, 5)).cumsum(axis=0)
         frames = np.minimum(frames, 65535).astype(np.uint16)
         meta = {"skin": layout.to_dict()}
         recordings.append(damaged(Recording(t, frames, joints, meta=meta), rng))
     return recordings
 
 
+def on_the_edges(layout):
+    """Contacts that stand on the edge of a comparison, from 0 s on."""
+    count = layout.onset + 100
+    frames = np.zeros((8, 140, *layout.shape), np.uint16)
+    t = np.tile(np.arange(140) / 100, (8, 1))
+    frames[0, :10, 2, 1] = layout.onset
+    frames[0, 10:, 2, 1] = layout.onset + 1
+    frames[1, :, 1, 1] = frames[1, :, 5, 3] = count  # equal regions
+    frames[2, :, 2, [0, 1, -1]] = count  # about the seam
+    frames[3, ::4, 2, 0] = frames[3, 1::4, 2, 0] = count  # half-way around and back
+    frames[3, 2::4, 2, layout.cols // 2] = frames[3, 3::4, 2, layout.cols // 2] = count
+    growing = count + np.arange(140)[:, None] * (3, 5, 7)
+    frames[4, :, [0, 3, 6], [0, 1, 2]] = growing.T  # on a line
+    frames[5:, :, 2, 1:3] = growing[:, 1:]
+    frames[5, [30, 60, 120]] = 0  # lifted off as a window ends
+    frames[6, 20] = 0  # as it is released
+    t[6, 20:] += layout.release_s - 0.01 - 5e-7
+    t[7, 1:] = np.arange(1, 140) * 0.6 / 39 + 5e-7  # as kernels are taken
+    joints = np.linspace(0, [2e5, -3e4, 1, 2, 3], 141)
+    # The frame before says that the touch was not under way.
+    t = np.insert(t, 0, -0.01, axis=1)
+    frames = np.insert(frames, 0, 0, axis=1)
+    valid = np.ones(frames[0].shape, bool)
+    valid[:, 0, 3] = False
+    more = {"joints": joints, "valid": valid, "meta": {"skin": layout.to_dict()}}
+    return [Recording(*of, **more) for of in zip(t, frames, strict=True)]
+
+
 def assert_same(model, folder, recordings, vectors=(), error=None, board=None):
     """Ask C about vectors and recordings, and compare every bit with Python's answer."""
-    c_code.write(model, folder, error)
+    c_code.export(model, folder, error)
     command = machine.compiled(folder, board)
     last = len(model.decision_points_s) - 1
     points = [last] if error is None else [*range(last + 1)]
@@ -108,6 +144,11 @@ def assert_same(model, folder, recordings, vectors=(), error=None, board=None):
         questions.append(machine.about_recording(kind, recording))
         expected.append(machine.vectors(model, points, recording))
     assert same(machine.ask(command, folder, questions), np.concatenate(expected))
+    assert_same_events(model, folder, command, recordings, error)
+
+
+def assert_same_events(model, folder, command, recordings, error=None):
+    """Compare every bit of the events of recordings."""
     kind = machine.EVENTS_OF_RECORDING
     questions = [machine.about_recording(kind, recording) for recording in recordings]
     rows = machine.ask(command, folder, questions).reshape(-1, 9)
@@ -130,19 +171,21 @@ def ordered(events):
 
 @pytest.fixture(scope="module")
 def early(tmp_path_factory):
-    """A model that decides early, of features of every kind, and touches new to it."""
+    """A model that decides early, of features of every kind, with a product and ties,
+    and touches new to it."""
     folder = tmp_path_factory.mktemp("early")
-    data = save_touches(folder / "data", 15)
+    for i, recording in enumerate(pressed(touch, range(8))):
+        save(folder / "data" / f"{i:02d}.npz", recording)
     words = ["--features", "contact", "moments", "joints", "--quick", "--scaling", "IV"]
-    words += ["--decision-points", "0.3,0.6,1.2", "--c", folder / "c"]
-    model = Model(export(folder / "out", "--data", data, *words) / "model.onnx")
+    words += ["--k", "2", "--decision-points", "0.3,0.6,1.2", "--c", folder / "c"]
+    out = export(folder / "out", "--data", folder / "data", *words)
+    model = Model(out / "model.onnx")
+    assert model.info.products.keys() == {"category"}
     rng = np.random.default_rng(5)
-    touches = [
-        touch(kind=kind, seed=30 + i) for i in range(4) for kind in ("hard", "soft")
-    ]
+    touches = list(pressed(touch, range(30, 32)))
     touches.append(in_a_row(touch(seed=50, seconds=0.5), touch(seed=51)))
     touches += [damaged(recording, rng) for recording in touches]
-    return model, touches
+    return model, [*touches, *on_the_edges(model.info.layout)]
 
 
 @needs_gcc
@@ -150,7 +193,7 @@ def test_the_demo_has_the_same_bits(tmp_path):
     model = Model(demo.MODEL)
     rng = np.random.default_rng(1)
     touches = [load(path) for path in sorted(demo.FOLDER.glob("*.npz"))]
-    touches += [damaged(recording, rng) for recording in touches * 3]
+    touches += [damaged(recording, rng) for recording in touches * 25]
     golden = np.load(Path(__file__).parents[1] / "golden" / "demo.npz")["vectors"]
     near = np.nextafter(golden[:20], np.inf)
     assert_same(
@@ -166,6 +209,58 @@ def test_early_decisions_have_the_same_bits(early, tmp_path):
     errors = {s.rules[i].error for s in model.info.stopping.values() for i in (0, -1)}
     for i, error in enumerate([None, *sorted(errors)]):
         assert_same(model, tmp_path / str(i), touches, vectors, error)
+
+
+def on_its_limits(model, recording, ulps):
+    """Metadata whose certified confidences are a contact's own, and whose limits are
+    its scores less so many ulps."""
+    info = model.info
+    points = range(len(info.decision_points_s))
+    vectors = machine.vectors(model, points, recording)[1:].reshape(len(points), -1)
+    answers = [model.run(vectors[i : i + 1], i) for i in points]
+    limits, far = (
+        tuple((a[name] - ulps * np.spacing(a[name])).item() for a in answers)
+        for name in ("novelty", "remoteness")
+    )
+    stopping = {}
+    for task, of_task in info.stopping.items():
+        label = answers[0][f"{task}_label"].item()
+        evidence = margin(answers[0][f"{task}_label_distances"][0].tolist(), label)
+        log_odds = of_task.slope * evidence + of_task.intercept
+        excess = info.novelty.excess(0, answers[0]["novelty"].item())
+        sure = logistic(log_odds - of_task.doubt * excess)
+        rules = [replace(r, confidence=sure, last=points[-1]) for r in of_task.rules]
+        remoteness = of_task.remoteness and replace(of_task.remoteness, limits=far)
+        stopping[task] = replace(of_task, rules=tuple(rules), remoteness=remoteness)
+    novelty = replace(info.novelty, limits=limits)
+    return replace(info, stopping=stopping, novelty=novelty)
+
+
+def half_millionths(info):
+    """Metadata by which every confidence lies closer than a float tells to half-way
+    between two millionths, above it or below it."""
+    stopping = {}
+    places = cycle((600000.5, 600001.5))
+    for task, of_task in info.stopping.items():
+        likely = next(places) / 1e6
+        x = np.log(likely / (1.0 - likely))
+        near = (x + np.spacing(x) * np.arange(-99, 99)).tolist()
+        x = next(value for value in near if logistic(value) == likely)
+        zeros = (0.0,) * len(of_task.slopes)
+        curves = {"slopes": zeros, "doubts": zeros, "intercepts": (x,) * len(zeros)}
+        stopping[task] = replace(of_task, remoteness=None, **curves)
+    return replace(info, stopping=stopping)
+
+
+@pytest.mark.slow
+@needs_gcc
+def test_scores_on_a_limit_have_the_same_bits(early, tmp_path, monkeypatch):
+    model, touches = early
+    error = max(s.rules[-1].error for s in model.info.stopping.values())
+    metadata = [on_its_limits(model, touches[0], ulps) for ulps in (0, 1)]
+    for i, info in enumerate([*metadata, half_millionths(model.info)]):
+        monkeypatch.setattr(model, "info", info)
+        assert_same(model, tmp_path / str(i), touches[:9], error=error)
 
 
 @pytest.mark.slow
@@ -196,28 +291,41 @@ def test_a_microcontroller_has_the_same_bits(early, tmp_path, board):
     assert_same(model, tmp_path, touches[::3], vectors, error, board)
 
 
-RANDOM = [
-    (kind, projection, scaling, k)
-    for projection, scaling, k in (
-        ("pca", "IV", 1),
-        ("lda", "none", 3),
-        ("pca", "I", 6),
-    )
-    for kind in ("plain", "lattice", "duplicates", "outlier", "far")
-][::2]
+def hostile_blends(X, count, rng):
+    """Vectors of every kind: trained ones, blends of two and what lies beyond them, an
+    ulp beside these, and some with a number that is huge, tiny, infinite or none."""
+    first, second = X[rng.integers(0, len(X), (2, count))]
+    weights = rng.choice([0.0, 0.5, 1.0, 1.5, -1e4, 1e30], (count, 1))
+    vectors = first + weights * (second - first)
+    beside = np.nextafter(vectors, rng.choice([-np.inf, np.inf], vectors.shape))
+    vectors = np.where(rng.random((count, 1)) < 0.3, beside, vectors)
+    odd = rng.choice([np.nan, np.inf, -np.inf, 1e308, -1e308, 5e-324, -0.0], count)
+    rows = np.flatnonzero(rng.random(count) < 0.2)
+    vectors[rows, rng.integers(0, X.shape[1], len(rows))] = odd[rows]
+    return vectors
 
 
 @pytest.mark.slow
 @needs_gcc
-@pytest.mark.parametrize(("kind", "projection", "scaling", "k"), RANDOM)
-def test_a_random_models_graph_has_the_same_bits(
-    tmp_path, kind, projection, scaling, k
-):
-    X, queries = hard_set(kind, np.random.default_rng(k))
-    choices = {"t": Choice(scaling, 6, min(k, len(X)), projection)}
+@pytest.mark.parametrize("seed", range(10))
+def test_a_random_models_graph_has_the_same_bits_of_hostile_vectors(tmp_path, seed):
+    """All trials may vote, each may have a label of its own, and tasks may lack some."""
+    rng = np.random.default_rng(seed)
+    kinds = "plain lattice duplicates outlier far".split()
+    X, queries = hard_set(kinds[seed % 5], rng)
+    choices = {}
+    for task in ("t", "some", "more")[: 1 + seed % 3]:
+        choices[task] = Choice(
+            str(rng.choice(SCALINGS)),
+            int(rng.integers(1, 25)),
+            int(rng.integers(1, len(X) // 2 + 1)),
+            str(rng.choice(["pca", "lda"])),
+        )
+    labels = int(rng.integers(2, len(X) + 1))
+    fitted = fit(X, choices, labels, lack=list(choices)[1:2])
     path = tmp_path / "model.onnx"
-    path.write_bytes(to_onnx(fit(X, choices), describe(fit(X, choices), samples=8)))
-    vectors = [*queries, *hostile(X.shape[1], np.random.default_rng(6))]
+    path.write_bytes(to_onnx(fitted, describe(fitted, samples=8)))
+    vectors = [*queries, *hostile(24, rng), *hostile_blends(X, 500, rng)]
     assert_same(Model(path), tmp_path / "c", [], vectors)
 
 
@@ -263,7 +371,7 @@ class NoGraph:
     steps = ()
     tables = ()
 
-    def __init__(self, model, points, arena):
+    def __init__(self, model, outputs, points, arena):
         self.arena = arena
         self.places = {}
 
@@ -279,8 +387,8 @@ def test_every_feature_of_damaged_recordings_has_the_same_bits(
     model = Model(demo.MODEL)
     tables = {}
     for name, biases in KERNELS.items():
-        shifts = rng.integers(-12, 8, channels_of(name, layout)).tolist()
-        limits = rng.integers(-9000, 40000, biases).tolist()
+        shifts = rng.integers(-20, 3, channels_of(name, layout)).tolist()
+        limits = rng.integers(-30, 99, biases).tolist()
         tables[name] = KernelTable(tuple(shifts), tuple(limits))
     model.info = replace(
         model.info,
@@ -293,9 +401,10 @@ def test_every_feature_of_damaged_recordings_has_the_same_bits(
         debounce=int(rng.integers(1, 4)),
     )
     monkeypatch.setattr(c_code, "CompiledGraph", NoGraph)
-    c_code.write(model, tmp_path, frames=300)
+    monkeypatch.setattr(c_code, "RATE_HZ", 250.0)
+    c_code.export(model, tmp_path)
     command = machine.compiled(tmp_path)
-    recordings = recordings_for(layout, 25, rng)
+    recordings = [*recordings_for(layout, 25, rng), *on_the_edges(layout)]
     kind = machine.VECTORS_OF_RECORDING
     questions = [machine.about_recording(kind, recording) for recording in recordings]
     expected = [machine.vectors(model, [0], recording) for recording in recordings]
@@ -309,7 +418,7 @@ def test_the_sketch_suits_the_header(tmp_path, monkeypatch):
     model = Model(demo.MODEL)
     model.info = replace(model.info, layout=SkinLayout(1, 12))
     monkeypatch.setattr(c_code, "CompiledGraph", NoGraph)
-    c_code.write(model, tmp_path)
+    c_code.export(model, tmp_path)
     shutil.copy(ROOT / "tests" / "arduino.h", tmp_path / "Wire.h")
     sketch = ROOT / "docs" / "examples" / "firmware" / "decide" / "decide.ino"
     command = ["g++", "-std=c++11", "-Wall", "-fsyntax-only", f"-I{tmp_path}", "-xc++"]
@@ -333,7 +442,7 @@ def test_the_baseline_follows_as_pythons(tmp_path):
     for raw, readable in zip(frames, valid, strict=True):
         expected.append(baseline.above(raw.ravel()))
         baseline.follow(raw.ravel(), readable.ravel())
-    c_code.write(Model(demo.MODEL), tmp_path)
+    c_code.export(Model(demo.MODEL), tmp_path)
     question = machine.about_recording(machine.BASELINE, recording)
     answer = machine.ask(machine.compiled(tmp_path), tmp_path, [question])
     assert answer.tolist() == np.concatenate(expected).tolist()
@@ -342,7 +451,7 @@ def test_the_baseline_follows_as_pythons(tmp_path):
 
 @needs_gcc
 def test_a_frame_that_cannot_be_taken_in_is_an_error(tmp_path):
-    c_code.write(Model(demo.MODEL), tmp_path)
+    c_code.export(Model(demo.MODEL), tmp_path)
     command = machine.compiled(tmp_path)
     recording = touch()
     t = recording.t
@@ -363,7 +472,7 @@ def test_a_frame_that_cannot_be_taken_in_is_an_error(tmp_path):
 
 @needs_gcc
 def test_options_that_change_bits_do_not_compile(tmp_path):
-    c_code.write(Model(demo.MODEL), tmp_path)
+    c_code.export(Model(demo.MODEL), tmp_path)
     for option in ("-ffast-math", "-mfma"):
         words = ["gcc", option, "-c", "graph.c", "-o", "graph.o"]
         ended = subprocess.run(words, cwd=tmp_path, capture_output=True, check=False)
@@ -383,24 +492,45 @@ def test_what_c_lacks_is_one_sentence(tmp_path):
     with pytest.raises(
         InputError, match="cannot be written in C, as it takes no shear"
     ):
-        c_code.write(model, tmp_path)
+        c_code.export(model, tmp_path)
 
 
-def test_early_decisions_are_left_out_to_fit_the_flash_and_said(early, tmp_path):
-    model, _ = early
+@pytest.mark.slow
+@needs_gcc
+def test_what_does_not_fit_the_flash_is_left_out_and_said(early, tmp_path, monkeypatch):
+    model, touches = early
     error = model.info.stopping["object"].rules[-1].error
-    whole = c_code.write(model, tmp_path, error).flash
-    text = c_code.export(model, tmp_path, error, whole // 1024 - 1)
-    assert text.endswith("early decisions are left out to fit --flash")
+    sizes = [
+        c_code.Source(model, *options).flash // 1024
+        for options in ((error,), (None,), (None, False))
+    ]
+    early_out = "; early decisions are left out to fit --flash"
+    no_novelty = "; novelty is left out to fit --flash: nothing is unusual or unknown"
+    for error_rate, flash_kb, said in (
+        (error, sizes[0] + 1, "at 133 MHz)"),
+        (error, sizes[0], f"at 133 MHz){early_out}"),
+        (None, sizes[1], f"at 133 MHz){no_novelty}"),
+        (error, sizes[1], f"at 133 MHz){early_out}{no_novelty}"),
+    ):
+        text = c_code.export(model, tmp_path, error_rate, flash_kb)
+        assert text.split(", and confidence")[0].endswith(said)
     with pytest.raises(InputError, match="kB of flash in C, above --flash"):
-        c_code.export(model, tmp_path / "none", None, 20)
+        c_code.export(model, tmp_path / "none", error, sizes[2])
     assert not (tmp_path / "none").exists()
+    info = model.info
+    never = (np.inf,) * len(model.decision_points_s)
+    stopping = {k: replace(v, remoteness=None) for k, v in info.stopping.items()}
+    novelty = Novelty(never, never)
+    monkeypatch.setattr(
+        model, "info", replace(info, novelty=novelty, stopping=stopping)
+    )
+    assert_same_events(model, tmp_path, machine.compiled(tmp_path), touches)
 
 
 def test_a_file_in_the_folder_s_place_is_one_sentence(tmp_path):
     (tmp_path / "file").touch()
     with pytest.raises(InputError, match="cannot be written: .*file is a file"):
-        c_code.write(Model(demo.MODEL), tmp_path / "file")
+        c_code.export(Model(demo.MODEL), tmp_path / "file")
 
 
 def test_a_table_takes_the_smallest_type_that_holds_it():
@@ -411,14 +541,14 @@ def test_a_table_takes_the_smallest_type_that_holds_it():
         ([0.5, np.inf], "float32"),
         ([0.1], "float64"),
     ):
-        table = table_of(np.array(values))
+        table = smallest(np.array(values), TYPES)
         assert table.dtype.name == kind
         assert table.tolist() == values
 
 
 def test_the_arena_is_shared_by_values_that_do_not_meet():
     model = Model(demo.MODEL)
-    graph = CompiledGraph(model, [0], 0)
+    graph = CompiledGraph(model, model.outputs, [0], 0)
     values = sum(len(step.outputs) * step.sizes[0] for step in graph.steps)
     assert graph.arena < values / 3
     assert graph.places["object_label"] < graph.arena

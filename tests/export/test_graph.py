@@ -215,7 +215,7 @@ def test_tasks_of_one_space_share_its_projection_but_not_their_rows(export):
     matrices = Counter(shape for shape in shapes if len(shape) == 2)
     weights = {(120, 7): 1, (120, 20): 1}
     rows = {(7, 50): 1, (20, 50): 3}
-    ballots = {(6, 5): 4}
+    ballots = {(6, 5): 1}
     assert matrices == weights | rows | ballots
     (opset,) = proto.opset_import
     assert opset.domain == ""
