@@ -215,6 +215,7 @@ def calibrate(
         jobs=options.processes,
         widths=dataset.widths(options.samples),
         early=settings.early,
+        heading="calibrating" * options.progress,
     )
     grouped = [t for t, chosen in settings.chosen.items() if chosen.left_out != TRIAL]
     return classifier.fit(at_points, y, settings.folds, settings.without, grouped)

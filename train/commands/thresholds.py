@@ -8,11 +8,8 @@ contacts that these and other thresholds give.
 
 import argparse
 
-from tqdm import tqdm
-
 from train.data.dataset import read
 from train.data.thresholds import count_contacts, proposed
-from train.progress import bar
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
@@ -36,9 +33,9 @@ def run(arguments: argparse.Namespace) -> int:
         low, high = (round(factor * max(level, 1)) for level in (threshold, onset))
         rows.append((name, min(low, 65534), min(high, 65534)))
     print(f"{'':<11}threshold  onset  recordings with a contact  contacts")
-    for name, low, high in bar(rows, desc="following", leave=False):
+    for name, low, high in rows:
         touched, total = count_contacts(recordings, low, high)
-        tqdm.write(
+        print(
             f"{name:<11}{low:>9}  {high:>5}  {touched:>12} of {len(recordings):<10}  "
             f"{total:>8}"
         )

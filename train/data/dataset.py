@@ -12,7 +12,7 @@ from operator import not_
 from pathlib import Path
 
 import numpy as np
-from joblib import Parallel, delayed
+from joblib import delayed
 
 from edge.arrays import Booleans, Floats
 from edge.errors import InputError
@@ -40,6 +40,7 @@ from train.data.kernels import MOST_TOUCHES, kernel_table
 from train.data.labels import shared_tasks
 from train.data.vectors import Labels, Strings, Vectors
 from train.progress import bar
+from train.threads import in_processes
 
 
 @dataclass(frozen=True)
@@ -234,7 +235,7 @@ def read(data: Sequence[str | Path], *, progress: bool = False) -> Recordings:
     digest = hashlib.sha256()
     recordings: list[Recording] = []
     bad: list[str] = []
-    for path in bar(paths, desc="reading", unit=" trials", disable=not progress):
+    for path in bar(paths, desc="reading", disable=not progress):
         try:
             contents = read_bytes(path, LARGEST_BYTES)
             recordings.append(load(path, io.BytesIO(contents)))
@@ -331,17 +332,11 @@ def load_trials(
         "features": names,
         "joints": posed.joints,
     }
-    work = Parallel(n_jobs=jobs, return_as="generator")(
+    work = [
         delayed(follow)(recording, path, layout, **tracked)
         for recording, path in posed.recordings
-    )
-    trials = bar(
-        work,
-        total=len(posed.recordings),
-        desc="following",
-        unit=" trials",
-        disable=not progress,
-    )
+    ]
+    trials = in_processes(jobs, work, "following" * progress)
     touched = collect(posed.recordings, trials, layout).completed()
     tasks = shared_tasks(touched.labels, partial=partial)
     labelled = touched.labelled(tasks, partial=partial)

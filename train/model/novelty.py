@@ -30,13 +30,13 @@ from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
-from joblib import Parallel, delayed
+from joblib import delayed
 from scipy.linalg import eigh
 from scipy.spatial.distance import cdist
 
 from edge.arrays import Booleans, Floats, Integers
 from train.data.vectors import Strings
-from train.threads import single_thread
+from train.threads import in_processes, single_thread
 
 UNUSUAL_RATE = 0.02
 UNKNOWN_RATE = 0.01
@@ -292,9 +292,9 @@ def held_out_scores(
         jobs: processes.
     """
     count = int(folds.max()) + 1
-    work = (delayed(_fold_scores)(X, labels, folds == k, widths) for k in range(count))
+    work = [delayed(_fold_scores)(X, labels, folds == k, widths) for k in range(count)]
     scores = np.full((2, *X.shape[:2]), np.nan)
-    for k, of_fold in enumerate(Parallel(n_jobs=jobs)(work)):
+    for k, of_fold in enumerate(in_processes(jobs, work)):
         scores[:, :, folds == k] = of_fold
     return Scores(*scores)
 

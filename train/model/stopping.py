@@ -121,6 +121,7 @@ class SequentialClassifier:
         jobs: processes.
         widths: columns of each feature type; equal where None.
         early: settings of early decision points; those of the full window where None.
+        heading: of progress bars on stderr; empty for none.
 
     Attributes:
         decision_points_: a fitted `ContactClassifier` for each decision point.
@@ -139,6 +140,7 @@ class SequentialClassifier:
     jobs: int = 1
     widths: Sequence[int] | None = None
     early: Early | None = None
+    heading: str = ""
 
     def fit(
         self,
@@ -178,6 +180,7 @@ class SequentialClassifier:
             folds,
             [of_folds, of_all],
             self.jobs,
+            self.heading,
         )
         self.right_ = chosen_without.right
         never_met = self._never_met(taken)
@@ -289,7 +292,7 @@ class SequentialClassifier:
             return {}
         at_end = replace(vectors, X=vectors.X[-1:])
         runs = [[self.choices]] * (int(things.max()) + 1)
-        (answered,) = held_out(at_end, things, [runs], self.jobs)
+        (answered,) = held_out(at_end, things, [runs], self.jobs, self.heading)
         excess = excess_of(self.novelty_, self._left_out.novelty)[-1]
         evidence = {}
         for task, tested in self._tested.items():

@@ -113,7 +113,13 @@ def tradeoff(data: Sequence[str], out: Path, board_path: str, options: Options) 
         costs=rows,
         wrong=options.wrong,
         second=options.second,
-        commands=_commands(data, out, board_path, options),
+        commands=Commands(
+            data=tuple(map(str, data)),
+            out=out,
+            quick=quick,
+            board=Path(board_path),
+            task=options.task,
+        ),
         notes=ready.notes,
     )
     report = _write(measured, out, counted(len(dataset.trials), "contact"))
@@ -126,17 +132,6 @@ def _write_front(front: ParetoFront, path: Path, digest: str) -> None:
     text = json.dumps(front.to_dict(digest), indent=1)
     with write_whole(path) as file:
         file.write(text.encode() + b"\n")
-
-
-def _commands(data: Sequence[str], out: Path, board: str, options: Options) -> Commands:
-    """The commands that make these models, and this report again."""
-    return Commands(
-        data=tuple(map(str, data)),
-        out=out,
-        quick=options.quick,
-        board=Path(board),
-        task=options.task,
-    )
 
 
 def _rate_hz(recordings: Sequence[Recording]) -> float:
