@@ -30,8 +30,7 @@ def blocked(_):
     return signal.pthread_sigmask(signal.SIG_BLOCK, ())
 
 
-def test_ctrl_c_reaches_the_parent_alone(capsys):
-    results = in_processes(2, [delayed(blocked)(i) for i in range(2)], "asking")
+def test_ctrl_c_reaches_the_parent_alone():
+    results = in_processes(2, [delayed(blocked)(i) for i in range(2)])
     assert all(signal.SIGINT in masks for masks in results)
     assert signal.SIGINT not in blocked(0)
-    assert capsys.readouterr().err == ""
