@@ -1,6 +1,7 @@
 """Feature types by name: whole numbers against sums in plain Python, values against
 fractions."""
 
+import math
 from dataclasses import replace
 from fractions import Fraction
 
@@ -19,6 +20,7 @@ from edge.touch.features import feature_vector
 from edge.touch.frame import Frame
 from edge.touch.layout import SkinLayout
 from edge.touch.measures import ZONES, names
+from edge.touch.zones import quantities
 from tests.edge.touch.pressed import active_of, followed, pressed, zones_of
 
 FLAT = SkinLayout(5, 7, threshold_counts=10, onset_counts=10, counts_per_newton=100.0)
@@ -161,6 +163,16 @@ def test_moments_are_those_of_exact_arithmetic(seed, density):
     assert value(FLAT, counts, "skin_width") == pytest.approx(
         float(shorter), abs=7 * 2.0**-25
     )
+
+
+@pytest.mark.parametrize("near", [2**30, 2**43 + 2**42, 2**46])
+def test_moments_beyond_64_bits_are_exact(near):
+    """A count in row 1024 and many in row 0: the variance times force squared is up to
+    2^66."""
+    sums = [near, 2, near + 1, 1024, 0, 2**20, 0, 0]
+    values = quantities(np.array([sums]), SkinLayout(2000, 4, wraps=False))
+    variance = Fraction(2**20 * near, (near + 1) ** 2)
+    assert values["spread_along"][0] == pytest.approx(math.sqrt(variance), rel=1e-15)
 
 
 def test_a_contact_is_followed_across_the_seam_and_does_not_jump():

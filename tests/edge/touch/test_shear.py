@@ -143,6 +143,13 @@ def test_the_largest_skin_full_of_the_largest_shear_does_not_overflow(wraps):
     assert shear.quantities(np.array([row]), layout)["twist"].tolist() == [0.0]
 
 
+def test_a_moment_beyond_64_bits_is_exact():
+    """2^32 times 2^32, and as much again."""
+    large = 2**32
+    row = [0, 1, large, large, 0, 0, 0, 0, 0, -large, large, 0]
+    assert quantities_of(row)["twist"] == 2.0 * large * 0.01 / 100.0
+
+
 def test_features_follow_the_shear_of_a_contact():
     frames = []
     for step in range(3):

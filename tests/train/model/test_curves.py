@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.special import expit
 
-from train.model.curves import DOUBT, LEAST_DOUBT, Curve
+from train.model.curves import DOUBT, LEAST_DOUBT, Curve, cross_fitted
 
 
 def test_finds_the_curve_that_drew_the_outcomes():
@@ -78,3 +78,19 @@ def test_the_mean_probability_is_moved_to_a_share(share):
     assert curve.doubt == 1.0
     expected = min(max(share, 0.5 / 200), 1.0 - 0.5 / 200)
     assert curve.probabilities(margins, excess).mean() == pytest.approx(expected)
+
+
+def test_a_folds_confidences_are_by_the_other_folds_tested_trials_alone():
+    rng = np.random.default_rng(5)
+    margins = rng.normal(size=(2, 60))
+    excess = rng.exponential(size=(2, 60))
+    right = rng.random((2, 60)) < 0.7
+    folds = np.arange(60) % 3
+    tested = np.arange(60) % 5 > 0
+    confidences = cross_fitted(margins, excess, right, folds, tested)
+    for fold in range(3):
+        inside = folds == fold
+        others = tested & ~inside
+        curve = Curve.of(margins[:, others], excess[:, others], right[:, others])
+        expected = curve.probabilities(margins[:, inside], excess[:, inside])
+        assert confidences[:, inside].tolist() == expected.tolist()

@@ -159,3 +159,14 @@ class TestProduct:
         product, factor = self.agreeing(own, replace(slow, error=0.2))
         assert product == [window]
         assert factor == [own]
+
+
+def test_a_family_has_half_the_level_and_goes_on_from_its_last_limit():
+    """Of 100 trials 10 are wrong at 0.8 s and none at 0.4 s, which is tested after
+    it."""
+    wrong = np.zeros((3, 100), dtype=bool)
+    wrong[1, :10] = True
+    full, fast = certify(course(np.zeros((3, 100)), wrong), SECONDS)
+    level = TEST_SHARE * RISK
+    assert (full.last, full.error) == (2, upper_limit(0, 100, level))
+    assert (fast.last, fast.error) == (0, upper_limit(10, 100, level / 2))

@@ -1,0 +1,68 @@
+"""Policies of early decisions: a product is decided by its factors' decisions."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from edge.early import Product
+from edge.events import Decided
+from edge.model.info import StoppingRule, Task
+from edge.model.model import Decision
+
+
+def task(*labels, **factors):
+    return Task(labels, 1, 1, "none", 1.0, factors=factors)
+
+
+TASKS = {
+    "category": task("x-a", "y-a", "y-b", first=(0, 1, 1), second=(0, 0, 1)),
+    "first": task("x", "y"),
+    "second": task("a", "b"),
+}
+OWN = Decision("x-a", 0.2, 1.0, *[np.zeros(1)] * 3, False, np.zeros(3))
+CANDIDATE = Decided("category", "x-a", 0.2, 0.6, 0.0, 1.0, decision=OWN)
+
+
+def answered(first, second, confidences=(0.9, 0.8), stops=("confidence",) * 2):
+    """The product's answer once its factors have these."""
+    info = SimpleNamespace(tasks=TASKS, stopping={"category": None})
+    policy = Product(info, "category", StoppingRule(0.1, 0.6, 0.7, 2), 0.1)
+    decided = {}
+    pairs = zip(("first", "second"), (first, second), confidences, stops, strict=True)
+    for name, label, confidence, stop in pairs:
+        decided[name] = Decided(name, label, confidence, 0.6, 0.0, 1.0, stopped_by=stop)
+    return policy.answer(CANDIDATE, 1, decided)
+
+
+def test_a_product_has_its_factors_labels_and_the_product_of_their_confidences():
+    answer = answered("y", "b")
+    assert answer.label == answer.decision.label == "y-b"
+    assert answer.confidence == 0.72
+    assert answer.error == 0.1
+
+
+@pytest.mark.parametrize(
+    ("stops", "stopped_by"),
+    [
+        (("confidence", "confidence"), "confidence"),
+        (("confidence", "window"), "window"),
+        (("window", "confidence"), "window"),
+    ],
+)
+def test_a_product_is_sure_where_both_factors_are(stops, stopped_by):
+    answer = answered("y", "a", stops=stops)
+    assert answer.stopped_by == stopped_by
+    assert ("unsure" in answer.flags) == (stopped_by == "window")
+
+
+def test_a_pair_that_was_never_met_has_no_name():
+    answer = answered("x", "b")
+    assert answer.label is None
+    assert answer.confidence == 0.0
+
+
+def test_a_product_waits_for_both_factors():
+    info = SimpleNamespace(tasks=TASKS, stopping={"category": None})
+    policy = Product(info, "category", StoppingRule(0.1, 0.6, 0.7, 2), 0.1)
+    assert policy.answer(CANDIDATE, 2, {"first": CANDIDATE}) is None
