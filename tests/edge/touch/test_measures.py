@@ -165,13 +165,14 @@ def test_moments_are_those_of_exact_arithmetic(seed, density):
     )
 
 
-@pytest.mark.parametrize("near", [2**30, 2**43 + 2**42, 2**46])
-def test_moments_beyond_64_bits_are_exact(near):
-    """A count in row 1024 and many in row 0: the variance times force squared is up to
-    2^66."""
-    sums = [near, 2, near + 1, 1024, 0, 2**20, 0, 0]
+@pytest.mark.parametrize("far", [1000, 114_000, 2**18])
+def test_moments_beyond_64_bits_are_exact(far):
+    """A thousandth of the force in row 1024, the rest in row 0: the variance times
+    force squared is up to 2^66."""
+    near = 1024 * far
+    sums = [near, 2, near + far, 1024 * far, 0, 2**20 * far, 0, 0]
     values = quantities(np.array([sums]), SkinLayout(2000, 4, wraps=False))
-    variance = Fraction(2**20 * near, (near + 1) ** 2)
+    variance = Fraction(2**20 * near * far, (near + far) ** 2)
     assert values["spread_along"][0] == pytest.approx(math.sqrt(variance), rel=1e-15)
 
 

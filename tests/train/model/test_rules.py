@@ -38,6 +38,7 @@ class TestStops:
 
     def test_at_the_first_decision_point_that_is_sure(self):
         assert self.stop() == [0, 1, 0]
+        assert self.stop(confidence=0.9) == [0, 2, 0]
 
     def test_a_fixed_window_waits_for_it_and_no_longer(self):
         assert self.stop(confidence=NEVER, last=1) == [1, 1, 1]
@@ -106,6 +107,24 @@ def test_certificates_fail_no_oftener_than_they_say():
     assert failed <= binom.ppf(0.99, 100, TEST_SHARE * RISK)
 
 
+def test_equal_rules_are_a_fixed_window_and_certain_error_is_no_rule():
+    """All are wrong at 0.4 s and none is later. Each is sure at 0.8 s."""
+    wrong = np.zeros((3, 100), dtype=bool)
+    wrong[0] = True
+    confidence = np.outer([0.0, 1.0, 1.0], np.ones(100))
+    full, fixed = certify(course(confidence, wrong), SECONDS)
+    assert full == StoppingRule(full.error, 1.2, NEVER, 2)
+    assert fixed == StoppingRule(fixed.error, 0.8, NEVER, 1)
+
+
+def test_a_task_is_wrong_where_it_names_nothing_when_it_is_decided():
+    right = np.zeros((3, 2), dtype=bool)
+    withheld = np.array([[True, False], [False, False], [False, True]])
+    decided = Course([np.full((3, 2), 0.9)], [right], right, withheld)
+    _, wrong = decided.under(StoppingRule(0.1, 1.0, 0.7, 2))
+    assert wrong.tolist() == [True, False]
+
+
 class TestProduct:
     """Two factors and their product, which is decided when both are."""
 
@@ -159,6 +178,8 @@ class TestProduct:
         product, factor = self.agreeing(own, replace(slow, error=0.2))
         assert product == [window]
         assert factor == [own]
+        _, factor = self.agreeing(own, replace(window, error=own.error))
+        assert factor == [replace(window, error=own.error)]
 
 
 def test_a_family_has_half_the_level_and_goes_on_from_its_last_limit():
