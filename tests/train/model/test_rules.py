@@ -114,7 +114,7 @@ def test_equal_rules_are_a_fixed_window_and_certain_error_is_no_rule():
     confidence = np.outer([0.0, 1.0, 1.0], np.ones(100))
     full, fixed = certify(course(confidence, wrong), SECONDS)
     assert full == StoppingRule(full.error, 1.2, NEVER, 2)
-    assert fixed == StoppingRule(fixed.error, 0.8, NEVER, 1)
+    assert (fixed.confidence, fixed.last) == (NEVER, 1)
 
 
 def test_a_task_is_wrong_where_it_names_nothing_when_it_is_decided():
