@@ -60,9 +60,3 @@ def test_a_pair_that_was_never_met_has_no_name():
     answer = answered("x", "b")
     assert answer.label is None
     assert answer.confidence == 0.0
-
-
-def test_a_product_waits_for_both_factors():
-    info = SimpleNamespace(tasks=TASKS, stopping={"category": None})
-    policy = Product(info, "category", StoppingRule(0.1, 0.6, 0.7, 2), 0.1)
-    assert policy.answer(CANDIDATE, 2, {"first": CANDIDATE}) is None

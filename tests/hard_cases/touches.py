@@ -2,10 +2,8 @@
 
 from fractions import Fraction
 
-import mpmath
 import numpy as np
 from hypothesis import strategies as st
-from mpmath import mpf
 
 from edge.touch.frame import Frame
 from edge.touch.kernels import SAMPLES, KernelTable, shares
@@ -13,6 +11,8 @@ from edge.touch.layout import SkinLayout
 from edge.touch.zones import quantities
 from tests.edge.touch.pressed import zones_of
 from tests.edge.touch.test_kernels import by_hand
+from tests.edge.touch.test_measures import moments
+from tests.edge.touch.test_shear import twist_of
 from tests.hard_cases.cases import SEEDS, Case, Ladder
 
 COLS = 8
@@ -32,8 +32,8 @@ def kernels_error(bits, seed):
 
 
 def zone(rows, seed):
-    """The layout, and the counts and shear of random taxels of a skin with so many
-    rows."""
+    """Random taxels of a skin with so many rows (row, column, counts), the whole
+    numbers of their zone, and its quantities."""
     rng = np.random.default_rng(seed)
     shape = (rows, COLS)
     layout = SkinLayout(rows, COLS, False, PITCH, threshold_counts=10, axes=3)
@@ -42,56 +42,26 @@ def zone(rows, seed):
     shear = rng.integers(-32768, 32768, (*shape, 2))
     frame = Frame(0.0, counts.astype(np.uint16), shear=shear.astype(np.int16))
     numbers = zones_of(layout, frame, ["skin_force", "skin_twist"])["skin"]
-    places = [(int(row), int(col)) for row, col in np.argwhere(counts)]
-    weights = [int(counts[place]) for place in places]
-    forces = [tuple(map(int, shear[place])) for place in places]
+    taxels = [(*place, counts[*place].item()) for place in np.argwhere(counts).tolist()]
     values = quantities(np.array([numbers]), layout)
-    return places, weights, forces, {name: v[0] for name, v in values.items()}
-
-
-def mean(values, weights):
-    """The weighted mean, as a fraction."""
-    total = sum(v * w for v, w in zip(values, weights, strict=True))
-    return Fraction(total) / sum(weights)
+    return taxels, numbers, {name: float(v[0]) for name, v in values.items()}
 
 
 def moments_error(rows, seed):
     """Largest error of a zone's spreads, slant and length, over their size."""
-    places, weights, _, measured = zone(rows, seed)
-    along, around = zip(*places, strict=True)
-    row, col = mean(along, weights), mean(around, weights)
-    rr = mean([(r - row) ** 2 for r in along], weights)
-    cc = mean([(c - col) ** 2 for c in around], weights)
-    rc = mean([(r - row) * (c - col) for r, c in places], weights)
-    with mpmath.workdps(50):
-        high, wide, slant = (mpf(v.numerator) / v.denominator for v in (rr, cc, rc))
-        root = mpmath.sqrt((high - wide) ** 2 + 4 * slant**2)
-        length = mpmath.sqrt((high + wide + root) / 2)
-        spreads = mpmath.sqrt(high), mpmath.sqrt(wide)
-        true = {
-            "spread_along": (spreads[0], spreads[0]),
-            "spread_around": (spreads[1], spreads[1]),
-            "slant": (slant, spreads[0] * spreads[1]),
-            "length": (length, length),
-        }
-        errors = [
-            abs(mpf(float(measured[name])) - value) / size if size else mpf(0)
-            for name, (value, size) in true.items()
-        ]
-        return float(max(errors))
+    taxels, _, measured = zone(rows, seed)
+    true = moments(taxels)
+    sizes = {name: true[name] for name in ("spread_along", "spread_around", "length")}
+    sizes["slant"] = sizes["spread_along"] * sizes["spread_around"]
+    errors = [abs(measured[n] - true[n]) / size for n, size in sizes.items() if size]
+    return float(max(errors, default=0.0))
 
 
 def shear_error(rows, seed):
     """Error of the twist, over the size of its two parts."""
-    places, weights, forces, measured = zone(rows, seed)
-    along, around = zip(*places, strict=True)
-    row, col = mean(along, weights), mean(around, weights)
-    pairs = list(zip(places, forces, strict=True))
-    first = sum((r - row) * around for (r, _), (_, around) in pairs)
-    second = sum((c - col) * along for (_, c), (along, _) in pairs)
-    parts = first * Fraction(PITCH[0]), second * Fraction(PITCH[1])
-    error = abs(Fraction(float(measured["twist"])) - (parts[0] - parts[1]))
-    return float(error / (sum(map(abs, parts)) or 1))
+    _, numbers, measured = zone(rows, seed)
+    twist, size = twist_of(numbers, PITCH)
+    return float(abs(Fraction(measured["twist"]) - twist) / (size or 1))
 
 
 LONGER = Ladder("rows of taxels", [16, 64, 256, 1024, 4096], "rows", "16 and 12")
