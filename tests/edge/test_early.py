@@ -5,9 +5,9 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from edge.early import Product
+from edge.early import Product, is_sure
 from edge.events import Decided
-from edge.model.info import StoppingRule, Task
+from edge.model.info import Stopping, StoppingRule, Task
 from edge.model.model import Decision
 
 
@@ -22,6 +22,13 @@ TASKS = {
 }
 OWN = Decision("x-a", 0.2, 1.0, *[np.zeros(1)] * 3, False, np.zeros(3))
 CANDIDATE = Decided("category", "x-a", 0.2, 0.6, 0.0, 1.0, decision=OWN)
+
+
+def test_a_label_is_sure_from_the_rules_confidence_on_and_less_so_in_doubt():
+    stopping = Stopping((), (), (), 1.0, 0.0, 1.0, (), 20, 0, 0.1)
+    rule = StoppingRule(0.1, 1.0, 0.5, 2)
+    assert is_sure(stopping, rule, [0.0, 2.0], 0, 2.0)
+    assert not is_sure(stopping, rule, [0.0, 2.0], 0, 2.01)
 
 
 def answered(first, second, confidences=(0.9, 0.8), stops=("confidence",) * 2):

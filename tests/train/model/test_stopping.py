@@ -124,6 +124,19 @@ def test_each_fold_is_answered_by_what_was_chosen_without_it():
     right = model.fit(X, {"t": labels}, folds, without).right_["t"][-1]
     assert right[folds != 0].all()
     assert not right[folds == 0].all()
+    assert model.stopping_["t"].wrong >= (~right).sum()
+
+
+def test_trials_without_a_fold_calibrate_nothing():
+    X, labels = touches(80)
+    folds = stratified_folds(labels)
+    folds[60:] = -1
+    X[:, 60:, 1] += 1e3
+    choices = of_neighbours(3)
+    model = SequentialClassifier(choices, SECONDS, ("max_force",))
+    model.fit(X, {"t": labels}, folds, [choices] * 10)
+    assert model.stopping_["t"].trials == 60
+    assert not model.unusual_[:, 60:].any()
 
 
 def test_a_held_out_trial_is_never_its_own_neighbour():
@@ -169,6 +182,8 @@ def test_too_few_trials_are_refused():
         InputError, match="calibration needs at least 20 trials, not 19"
     ):
         calibrated(of_neighbours(1), X, {"t": labels})
+    X, labels = touches(20)
+    assert calibrated(of_neighbours(1), X, {"t": labels}).stopping_["t"].trials == 20
 
 
 def test_a_kind_is_no_name_though_it_has_more_labels():
