@@ -153,15 +153,6 @@ def test_trials_without_a_fold_have_no_score():
     assert np.isfinite(scores.remoteness[:, 4:]).all()
 
 
-def test_limits_lie_in_the_exponential_tail_of_the_logarithms():
-    scores = np.exp(np.arange(1000.0) / 100.0)[None]
-    typical, limits = limits_of(scores, 0.02)
-    assert typical[0] == pytest.approx(math.exp(4.995))
-    tail = np.quantile(np.log(scores), 0.9)
-    excess = np.log(scores[np.log(scores) >= tail]).mean() - tail
-    assert limits[0] == pytest.approx(math.exp(tail + excess * math.log(0.1 / 0.02)))
-
-
 def test_few_trials_have_few_components():
     X, labels = trials(12)
     assert NoveltySpace.of(X, labels, WIDTHS).weights.shape == (30, 4)

@@ -20,13 +20,6 @@ from train.model.rules import (
 )
 
 
-@pytest.mark.parametrize(("wrong", "trials"), [(0, 20), (3, 140), (140, 140)])
-def test_the_upper_limit_is_where_the_exact_binomial_test_turns(wrong, trials):
-    limit = upper_limit(wrong, trials, 0.1)
-    assert binom.cdf(wrong, trials, min(limit + 1e-9, 1.0)) <= 0.1 or limit == 1.0
-    assert binom.cdf(wrong, trials, limit - 1e-6) > 0.1
-
-
 class TestStops:
     CONFIDENCE = np.array([[0.9, 0.2, 0.9], [0.9, 0.8, 0.1], [0.1, 0.9, 0.2]])
 
