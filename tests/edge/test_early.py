@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from edge.early import Product, is_sure
+from edge.early import Early, Product, is_sure, policies
 from edge.events import Decided
 from edge.model.info import Stopping, StoppingRule, Task
 from edge.model.model import Decision
@@ -31,12 +31,16 @@ def test_a_label_is_sure_from_the_rules_confidence_on_and_less_so_in_doubt():
     assert not is_sure(stopping, rule, [0.0, 2.0], 0, 2.01)
 
 
-def answered(first, second, confidences=(0.9, 0.8), stops=("confidence",) * 2):
-    """The product's answer once its factors have these."""
+SURE = StoppingRule(0.1, 0.6, 0.7, 2)
+FIXED = StoppingRule(0.1, 0.6, 2.0, 1)
+
+
+def answered(first, second, stops=("confidence",) * 2, rule=SURE):
+    """The product's answer once its factors have these, with 0.9 and 0.8."""
     info = SimpleNamespace(tasks=TASKS, stopping={"category": None})
-    policy = Product(info, "category", StoppingRule(0.1, 0.6, 0.7, 2), 0.1)
+    policy = Product(info, "category", rule, 0.1)
     decided = {}
-    pairs = zip(("first", "second"), (first, second), confidences, stops, strict=True)
+    pairs = zip(("first", "second"), (first, second), (0.9, 0.8), stops, strict=True)
     for name, label, confidence, stop in pairs:
         decided[name] = Decided(name, label, confidence, 0.6, 0.0, 1.0, stopped_by=stop)
     return policy.answer(CANDIDATE, 1, decided)
@@ -61,6 +65,20 @@ def test_a_product_is_sure_where_both_factors_are(stops, stopped_by):
     answer = answered("y", "a", stops=stops)
     assert answer.stopped_by == stopped_by
     assert ("unsure" in answer.flags) == (stopped_by == "window")
+    assert "unsure" not in answered("y", "a", stops, FIXED).flags
+
+
+@pytest.mark.parametrize(("rule", "kind"), [(SURE, Product), (FIXED, Early)])
+def test_a_product_needs_its_factors_unless_it_waits_for_a_fixed_window(rule, kind):
+    points = (0.3, 0.6, 1.2)
+    info = SimpleNamespace(
+        tasks=TASKS,
+        products={"category": {}},
+        decision_points_s=points,
+        stopping={"category": SimpleNamespace(rules=[rule])},
+    )
+    (policy,) = policies(SimpleNamespace(info=info), 0.1).values()
+    assert type(policy) is kind
 
 
 def test_a_pair_that_was_never_met_has_no_name():
