@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from edge.early import Early, Product, is_sure, policies
+from edge.early import Early, Product, is_sure, policies, refusal
 from edge.events import Decided
 from edge.model.info import Stopping, StoppingRule, Task
 from edge.model.model import Decision
@@ -21,7 +21,7 @@ TASKS = {
     "second": task("a", "b"),
 }
 OWN = Decision("x-a", 0.2, 1.0, *[np.zeros(1)] * 3, False, np.zeros(3))
-CANDIDATE = Decided("category", "x-a", 0.2, 0.6, 0.0, 1.0, decision=OWN)
+CANDIDATE = Decided("category", "x-a", 0.2, 0.6, 0.0, 1.0, ("tie",), decision=OWN)
 
 
 def test_a_label_is_sure_from_the_rules_confidence_on_and_less_so_in_doubt():
@@ -33,6 +33,12 @@ def test_a_label_is_sure_from_the_rules_confidence_on_and_less_so_in_doubt():
 
 SURE = StoppingRule(0.1, 0.6, 0.7, 2)
 FIXED = StoppingRule(0.1, 0.6, 2.0, 1)
+
+
+def test_more_trials_do_not_certify_an_error_that_is_made():
+    stopping = Stopping((), (), (), 1.0, 0.0, 1.0, (SURE,), 20, 2, 0.1)
+    assert "more trials alone will not do" in refusal(stopping, 0.1)
+    assert "0.11 needs about" in refusal(stopping, 0.11)
 
 
 def answered(first, second, stops=("confidence",) * 2, rule=SURE):
@@ -51,6 +57,7 @@ def test_a_product_has_its_factors_labels_and_the_product_of_their_confidences()
     assert answer.label == answer.decision.label == "y-b"
     assert answer.confidence == 0.72
     assert answer.error == 0.1
+    assert answer.flags == ()
 
 
 @pytest.mark.parametrize(
