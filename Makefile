@@ -317,9 +317,9 @@ $(VENV)/.browser: $(DEV)
 	@touch $@
 
 BROWSED := tests/edge/tools/test_page.py tests/train/tradeoff/test_slider.py \
-  tests/train/report/test_page.py tests/train/study/test_study_report.py
+  tests/train/report/test_page.py tests/train/study/test_study_report.py tests/test_site.py
 
-browser-test: $(VENV)/.browser
+browser-test: $(VENV)/.browser $(VENV)/.docs
 	$(BIN)/python -m pytest $(BROWSED) -rs
 
 service-test: $(DEV)

@@ -190,7 +190,7 @@ OPTIONS: dict[str, dict[str, Any]] = {
 def parser() -> argparse.ArgumentParser:
     """The command line."""
     top = argparse.ArgumentParser(
-        prog="export",
+        prog="edge-classify export",
         description="Fits a model for every task that the recordings' labels share, and writes "
         "OUT/model.onnx and OUT/golden.npz. Options you give are held fixed. The "
         "others are chosen for each task: the smallest model within one standard error "

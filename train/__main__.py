@@ -5,7 +5,6 @@ import sys
 from collections.abc import Iterable, Sequence
 
 from edge.cli import add_commands, dispatch
-from edge.tools.workstation import refuse_command
 
 COMMANDS = {
     "import": "train.commands.import_",
@@ -22,7 +21,7 @@ def parser(names: Iterable[str] = COMMANDS) -> argparse.ArgumentParser:
     """The command line, with the named commands alone: loading all takes half a
     second."""
     top = argparse.ArgumentParser(
-        prog="train",
+        prog="edge-classify",
         description="Imports, simulates, studies and draws recordings; `python -m export` makes "
         "a model of them.",
     )
@@ -34,13 +33,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     """Run the command; 0 fine, 1 a check failed, 2 bad usage or input."""
     words = list(sys.argv[1:] if argv is None else argv)
     try:
-        if not words:
-            parser().print_help()
-            return 2
-        if not words[0].startswith("-") and words[0] not in COMMANDS:
-            return refuse_command("train", words[0], list(COMMANDS))
-        first = words[0]
-        return dispatch(parser([first] if first in COMMANDS else COMMANDS), words)
+        names = [word for word in words[:1] if word in COMMANDS]
+        return dispatch(parser(names or COMMANDS), words)
     except KeyboardInterrupt:  # while the commands were being loaded
         return 130
 

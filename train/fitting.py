@@ -219,6 +219,7 @@ def calibrate(
         widths=dataset.widths(options.samples),
         early=settings.early,
         drawn=are_drawn(dataset),
+        heading="calibrating" * options.progress,
     )
     grouped = [t for t, chosen in settings.chosen.items() if chosen.left_out != TRIAL]
     return classifier.fit(at_points, y, settings.folds, settings.without, grouped)

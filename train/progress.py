@@ -10,29 +10,35 @@ from edge.errors import printable
 
 LOG_S = 10.0
 """Between two lines of progress in a log."""
+FIRST_S = 2.0
+"""Before the first line of a step. A shorter step has none."""
 
 
 def bar(iterable: Iterable[Any] | None = None, **options: Any) -> Any:
-    """A progress bar; where stderr is no terminal, a line every ten seconds at most.
+    """A progress bar; where stderr is no terminal, a line every ten seconds.
 
     Args:
         iterable: the items to work through; None where `update` counts.
         options: of tqdm.
     """
-    if not sys.stderr.isatty():
-        options = {
-            "delay": LOG_S,
-            "mininterval": LOG_S,
-            "maxinterval": LOG_S,
-            **options,
-        }
-    return tqdm(iterable, **options)
+    if sys.stderr.isatty() or options.get("disable"):
+        return tqdm(iterable, **options)
+    often = {"delay": FIRST_S, "mininterval": LOG_S, "maxinterval": LOG_S}
+    progress = tqdm(iterable, file=Lines(), **often, **options)
+    progress.last_print_t -= LOG_S - FIRST_S
+    return progress
+
+
+class Lines:
+    """Stderr where each state of a bar is a line of its own."""
+
+    def write(self, text: str) -> None:
+        """Write a bar, without what returns to the beginning of its line."""
+        if text.strip():
+            print(text.strip(), file=sys.stderr, flush=True)
 
 
 def say(text: str) -> None:
     """Print a line on stdout, above a progress bar, without control characters."""
-    text = printable(text)
-    if sys.stderr.isatty():
-        tqdm.write(text, file=sys.stdout)
-    else:
-        print(text, flush=True)
+    tqdm.write(printable(text), file=sys.stdout)
+    sys.stdout.flush()

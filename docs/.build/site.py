@@ -21,7 +21,13 @@ def on_page_markdown(markdown: str, page: Any, config: Any, **_: Any) -> str:
 
 
 def on_post_build(config: Any, **_: Any) -> None:
-    """Add the colours of code, for a light and a dark page, to the site's style sheet."""
+    """Add the colours of code, for a light and a dark page, to the site's style sheet.
+
+    The theme's script would switch the style sheets of highlight.js, which is off.
+    """
+    script = Path(config["site_dir"]) / "js" / "darkmode.js"
+    lines = script.read_text(encoding="utf-8").splitlines(keepends=True)
+    script.write_text("".join(line for line in lines if ".disabled" not in line))
     light = HtmlFormatter(style="default").get_style_defs(".highlight")
     dark = HtmlFormatter(style="github-dark").get_style_defs(
         "[data-bs-theme=dark] .highlight"

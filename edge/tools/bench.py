@@ -10,7 +10,6 @@ import argparse
 import hashlib
 import json
 import math
-import os
 import platform
 import subprocess
 import sys
@@ -87,16 +86,12 @@ def measure(model: Model) -> dict[str, Any]:
         "machine": {
             "name": platform.node(),
             "kind": kind(),
-            "cores": os.cpu_count(),
             "edge-classify": __version__,
         },
         "model": {
             "sha256": hashlib.sha256(model.contents.data).hexdigest(),
             "data_digest": model.info.data_digest,
-            "bytes": len(model.contents.data),
-            "features": list(model.info.features),
         },
-        "rounds": REPEATS * ROUNDS,
         "stages": stages,
         "memory_mb": round(peak / per_megabyte, 1),
         "cold_start_ms": round(cold_start_ms(model.path), 1),

@@ -14,6 +14,7 @@ import numpy as np
 from edge.arrays import Array, Booleans, Floats, Integers
 from edge.commands.output import Output, counted
 from edge.commands.texts import wrapped
+from edge.errors import InputError
 from edge.files import parsing
 from edge.model.graph import Graph
 from edge.model.info import ModelInfo
@@ -224,20 +225,23 @@ class _Touch:
 
 def add_options(parser: argparse.ArgumentParser) -> None:
     """Add the command's options."""
-    parser.add_argument("model", metavar="model.onnx", help="the model")
+    parser.add_argument("--model", metavar="model.onnx", help="or the first file")
     parser.add_argument(
-        "recordings",
+        "files",
         nargs="+",
         metavar="REC",
-        help=".npz files or folders",
+        help=".npz files or folders; without --model, the model stands before them",
     )
 
 
 def run(arguments: argparse.Namespace) -> int:
     """Print an explanation for each recording and task."""
-    model = Model(arguments.model)
+    recordings = arguments.files
+    model = Model(arguments.model or recordings.pop(0))
+    if not recordings:
+        raise InputError("name the recordings to explain after the model")
     output = Output.of(arguments)
-    for path in find(arguments.recordings):
+    for path in find(recordings):
         if not output.as_json:
             output.text(str(path))
         for line in explanations(model, load(path), str(path)):

@@ -25,7 +25,10 @@ UNMEASURED = (
 
 def add_options(parser: argparse.ArgumentParser) -> None:
     """Add the command's options."""
-    parser.add_argument("model", metavar="model.onnx", help="the model")
+    model = parser.add_mutually_exclusive_group(required=True)
+    name = "model.onnx"
+    model.add_argument("model", nargs="?", default=argparse.SUPPRESS, metavar=name)
+    model.add_argument("--model", metavar=name, help="the same, as for other commands")
 
 
 def run(arguments: argparse.Namespace) -> int:

@@ -204,9 +204,8 @@ class Summary:
 
     def right(self, task: str) -> tuple[int, int]:
         """The number of right decisions, and of labelled recordings, of a task."""
-        pairs = self._pairs[task]
-        right = sum(n for (truth, decided), n in pairs.items() if truth == decided)
-        return right, pairs.total()
+        hits = self.hits[task]
+        return sum(hits.values()), len(hits)
 
     def text(self) -> str:
         """One table for each task: a row for each true label, a column for each decided

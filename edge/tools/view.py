@@ -4,10 +4,12 @@ Draws the skin and, with --model, the events of the last contact. Taxels in cont
 red to white by force, those below the contact threshold grey, and those that cannot be
 read blue. Each line shows two rows of taxels, with row 0 at the top. Ctrl-C quits. With
 --web, a page for a browser shows the same, with the features of each contact over time.
+Where NO_COLOR is set, digits show the force.
 """
 
 import argparse
 import math
+import os
 import shutil
 import sys
 import textwrap
@@ -21,9 +23,10 @@ import numpy as np
 from edge.arrays import Bytes, Floats
 from edge.classifier import Classifier
 from edge.commands.options import add_reading
-from edge.commands.output import counted
+from edge.commands.output import Output, counted
 from edge.commands.source import reading
 from edge.commands.texts import event_text
+from edge.errors import InputError
 from edge.events import Event, Onset
 from edge.model.model import Model
 from edge.touch.active import Region
@@ -45,9 +48,11 @@ TOUCH = (88, 124, 160, 196, 202, 208, 214, 220, 226, 228, 231)
 LOST = 18
 """Dark blue, for a taxel that cannot be read."""
 LEGEND = (
-    "red to white: in contact, by force; grey: below the threshold; blue: cannot be "
-    "read; Ctrl-C quits"
+    "red to white, 1 to B: in contact, by force; grey: below the threshold; blue, ?: "
+    "cannot be read; Ctrl-C quits"
 )
+GLYPHS = {LOST: "?", **dict(zip(TOUCH, "123456789AB", strict=True))}
+"""Characters for colours, where the terminal shall have none; others are dots."""
 RATE_HZ = 10.0
 """Pictures per second."""
 FULL_NEWTONS = 17.0
@@ -107,6 +112,11 @@ def picture(colour: Colours, *, wide: int = 2) -> str:
         colour: (rows, cols) numbers in the 256-colour palette.
         wide: characters per taxel.
     """
+    if os.environ.get("NO_COLOR"):
+        rows = colour.tolist()
+        return "\n".join(
+            "".join(GLYPHS.get(shade, ".") * wide for shade in row) for row in rows
+        )
     lines = []
     for top in range(0, len(colour), 2):
         line = ""
@@ -168,10 +178,21 @@ def draw(frame: Frame, layout: SkinLayout, events: Iterable[str]) -> str:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Read at the skin's rate, and draw at `RATE_HZ`."""
+    """Read at the skin's rate, and draw at `RATE_HZ`.
+
+    Raises:
+        InputError: there is nobody to draw for.
+    """
+    due = math.inf
+    if arguments.web is None:
+        due = -math.inf
+        if Output.of(arguments).as_json:
+            raise InputError(
+                "view draws for a person: give it a terminal or --web; `edge-classify "
+                "run` prints JSON lines"
+            )
     model = None if arguments.model is None else Model(arguments.model)
     texts: deque[str] = deque(maxlen=MOST_EVENTS)
-    due = -float("inf")
     with (
         reading(
             arguments,
@@ -188,7 +209,7 @@ def run(arguments: argparse.Namespace) -> int:
             events = [] if classifier is None else classifier.push(frame)
             live.show(frame, faults, events)
             _follow(events, texts)
-            if live.page is None and frame.t >= due:
+            if frame.t >= due:
                 due = frame.t + interval_s
                 print(
                     screen(draw(frame, layout, texts)),

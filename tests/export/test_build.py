@@ -77,3 +77,11 @@ def test_widened_columns_are_zero():
     narrow, wide = widened([np.ones((2, 1)), np.ones((2, 3))], 3)
     assert narrow.tolist() == [[1.0, 0.0, 0.0]] * 2
     assert wide.tolist() == [[1.0, 1.0, 1.0]] * 2
+
+
+def test_a_named_constant_has_a_row_for_each_decision_point(graph):
+    build, _ = graph
+    build.decision_point = "point"
+    build.by_decision_point([np.ones(2)] * 3, "rows")
+    (rows,) = build.constants.values()
+    assert list(rows.dims) == [3, 2]

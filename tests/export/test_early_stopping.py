@@ -118,6 +118,7 @@ def test_decision_points_may_have_features_and_directions_of_their_own(
     X, sequential, model = with_early_settings
     queries = np.random.default_rng(4).normal(size=(9, X.shape[2]))
     queries *= 10.0 ** np.arange(-2, 7)[:, None]
+    queries[0] = sequential.space_.points[1].mean  # nothing lies outside the components
     scores = sequential.space_.scores(np.stack([queries] * 3))
     for point, fitted in enumerate(sequential.decision_points_):
         answers = model.run(queries, point)

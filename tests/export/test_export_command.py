@@ -25,7 +25,7 @@ def test_a_folder_that_cannot_be_written_is_named_before_any_work(tmp_path, caps
     (tmp_path / "file").touch()
     out = tmp_path / "file"
     assert main(["--data", str(tmp_path / "missing"), "--out", str(out)]) == 2
-    sentence = f"export: {out}: cannot be written: File exists\n"
+    sentence = f"edge-classify export: {out}: cannot be written: File exists\n"
     assert capsys.readouterr().err == sentence
     words = ["--data", "missing", "--out", str(tmp_path), "--c", str(out)]
     assert main(words) == 2
@@ -129,7 +129,7 @@ def test_options_that_make_no_sense_are_one_sentence(
     command = ["--data", str(recordings), "--out", str(out), "--jobs", "1"]
     assert main([*command, *(() if "--front" in options else PAPER), *options]) == 2
     last = capsys.readouterr().err.splitlines()[-1]
-    assert last.startswith("export: ")
+    assert last.startswith("edge-classify export: ")
     assert word in last
     assert not any(out.iterdir())
 

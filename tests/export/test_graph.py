@@ -160,10 +160,11 @@ def test_every_number_of_the_graph_is_that_of_whole_numbers(
     points = exact.coordinates(queries, p, c)
     expected = by_hand(fitted, rows, points, k)
     assert (task_fit.rows / p.grid_.unit).tolist() == rows.tolist()
-    outputs = [z_name, *(f"t_{name}" for name in expected)]
+    outputs = [z_name, *(f"t_{name}" for name in expected), "out_of_range"]
     runs = engines(proto.SerializeToString(), outputs).values()
     ours, theirs = (run(queries) for run in runs)
-    z, *answers = ours
+    z, *answers, cut = ours
+    assert cut.tolist() == exact.projected(queries, p).cut.tolist()
     assert z[:, :c].tolist() == points.tolist()
     for (name, values), numbers in zip(expected.items(), answers, strict=True):
         assert numbers.tolist() == values, name

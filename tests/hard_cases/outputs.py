@@ -19,7 +19,7 @@ from tests.hard_cases.models import exported, features, one_by_one
 from tests.hard_cases.neighbours import near_duplicates, offset_data
 from train.data.folds import stratified_folds
 from train.model.pipeline import Choice
-from train.model.stopping import SequentialClassifier
+from train.model.stopping import Early, SequentialClassifier
 
 POINTS_S = (0.4, 0.8, 1.2)
 LDA = {"projection": "lda", "shrinkage": 0.1}
@@ -31,6 +31,12 @@ CHOICES = {
     "surface": Choice("III", 5, 7),
 }
 """Of every number of neighbours that the graph treats in its own way: one, two, more."""
+FIRST = {
+    "category": Choice("IV", 3, 5, features=("contact_area",), **LDA),
+    "mobility": Choice("none", 5, 1, features=("max_force", "contact_motion")),
+}
+"""Settings of early points, of two of the tasks."""
+EARLY = "own features early"
 KINDS = ("contacts", "near-duplicates", "duplicates", "offset", "tiny")
 TASK_OUTPUTS = ("label", "scores", "distances", "neighbours", "label_distances")
 
@@ -68,7 +74,7 @@ class Whole:
 
     Args:
         n: training trials, a multiple of eight.
-        kind: one of `KINDS`.
+        kind: one of `KINDS`, or `EARLY`.
     """
 
     def __init__(self, n, kind):
@@ -76,7 +82,8 @@ class Whole:
         self.y = labels_of(n)
         # Early windows: of the same trials, with less of what tells them apart.
         self.X = np.stack([X[::-1], 0.5 * (X + X[::-1]), X])
-        classifier = SequentialClassifier(CHOICES, POINTS_S)
+        early = Early(POINTS_S[-1], FIRST, [FIRST] * 10) if kind == EARLY else None
+        classifier = SequentialClassifier(CHOICES, POINTS_S, early=early)
         folds = stratified_folds(self.y["object"])
         self.fitted = classifier.fit(self.X, self.y, folds, [CHOICES] * 10)
         self.data, self.model = exported(self.fitted)
@@ -274,6 +281,16 @@ CASES = [
         outputs_error,
         HAZARDS,
         AROUND,
+        FARTHER,
+        examples=6,
+    ),
+    Case(
+        "outputs: early points with features and directions of their own",
+        "whole numbers and fractions, from the fitted numbers",
+        "values with another bit",
+        outputs_error,
+        [{**at, "kind": EARLY, "point": i} for i, at in enumerate(HAZARDS[:3])],
+        AROUND | {"kind": st.just(EARLY)},
         FARTHER,
         examples=6,
     ),

@@ -13,7 +13,7 @@ def refusal(capsys):
     def sentence(*words):
         assert main([*map(str, words)]) == 2
         *_, last = capsys.readouterr().err.replace("\r", "\n").strip().splitlines()
-        assert last.startswith("train: ")
+        assert last.startswith("edge-classify: ")
         return last
 
     return sentence

@@ -11,12 +11,16 @@ def test_short_work_says_nothing_in_a_log(capsys):
     assert capsys.readouterr().err == ""
 
 
-def test_long_work_says_so_in_a_log(capsys, monkeypatch):
+def test_long_work_is_a_line_each_time_in_a_log(capsys, monkeypatch):
     monkeypatch.setattr(progress, "LOG_S", 0.0)
+    monkeypatch.setattr(progress, "FIRST_S", 0.0)
 
     list(progress.bar(range(10), desc="working"))
 
-    assert "working" in capsys.readouterr().err
+    err = capsys.readouterr().err
+    assert all(line.startswith("working: ") for line in err.splitlines())
+    assert "working: 100%" in err
+    assert "\r" not in err
 
 
 def test_a_terminal_has_a_bar(capsys, monkeypatch):

@@ -262,7 +262,10 @@ class Choosing:
         widths = dataset.widths(self._samples)
         vectors = Vectors(np.stack(at_points), self._y, dataset.names, widths)
         folds = self._divisions.folds
-        return settle_early(vectors, window_s, full, options, folds, self._jobs)
+        heading = "early choices" * self._progress
+        return settle_early(
+            vectors, window_s, full, options, folds, self._jobs, heading
+        )
 
     def _settle(
         self,

@@ -128,6 +128,7 @@ def settle_early(
     options: Sequence[Choices],
     folds: Integers,
     jobs: int,
+    heading: str = "",
 ) -> Early:
     """The settings of the decision points before the full window: for each task, those
     of the option that errs least often when sure.
@@ -139,6 +140,7 @@ def settle_early(
         options: [option]{task: its settings}.
         folds: (n,) without which the settings are chosen too.
         jobs: processes.
+        heading: of a progress bar on stderr; empty for none.
     """
     y = vectors.y
     left_out = stratified_folds(y[finest(y)], FOLDS)
@@ -153,7 +155,7 @@ def settle_early(
             for at in (*[option] * len(SHARES), full)
         ]
         runs.append([at_points] * FOLDS)
-    answered = held_out(vectors, left_out, runs, jobs)
+    answered = held_out(vectors, left_out, runs, jobs, heading)
     factors = factors_of(y)
     best: dict[str, list[Choice]] = {}
     for task, labels in y.items():

@@ -22,7 +22,7 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
-from joblib import Parallel, delayed
+from joblib import delayed
 from numpy.typing import NDArray
 
 from edge.arrays import Booleans, Floats, Integers
@@ -41,6 +41,7 @@ from train.choose.search import SearchGrid
 from train.data.vectors import Strings, Vectors
 from train.model.pipeline import Choice
 from train.model.scaling import finite
+from train.threads import in_processes
 
 VARIANCE = 2.5
 """Variance of the nested accuracy around the exported model's accuracy on other trials,
@@ -263,7 +264,7 @@ def evaluate(
     grids: Sequence[SearchGrid],
     *,
     jobs: int = 1,
-    progress: Callable[[], object] | None = None,
+    progress: Callable[[], object] = lambda: None,
     nested: bool = True,
     halve: RuleOf | None = None,
 ) -> AnswerTable:
@@ -293,16 +294,14 @@ def evaluate(
     table = _empty(folds, grids, classes)
     steps = rungs(count, nested) if halve else [(count, fold_pairs(count, nested))]
     for step, (reach, pairs) in enumerate(steps, 1):
-        work = (
+        work = [
             delayed(answers_without)(
                 vectors, classes, np.isin(folds, pair), _fitted(table, pair, grids)
             )
             for pair in pairs
-        )
-        results = Parallel(n_jobs=jobs, return_as="generator")(work)
-        for pair, answers in zip(pairs, results, strict=True):
-            if progress is not None:
-                progress()
+        ]
+        for pair, answers in zip(pairs, in_processes(jobs, work), strict=True):
+            progress()
             table.enter(pair, answers)
         if halve is not None and step < len(steps):
             table.drop(reach, halve)

@@ -8,6 +8,7 @@ import argparse
 import os
 from pathlib import Path
 
+from edge.commands.options import within
 from edge.writing import check_writable
 
 
@@ -33,13 +34,13 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     )
     option(
         "--jobs",
-        type=int,
+        type=within(int, 1, 1000),
         default=os.cpu_count() or 1,
         help="processes (default: all cores)",
     )
     option(
         "--seeds",
-        type=int,
+        type=within(int, 1, 1000),
         default=1,
         help="data sets of the scene whose mean is set beside the paper's numbers (default: 1, "
         "these recordings alone; with 8, each takes about half a minute)",

@@ -10,6 +10,7 @@ import os
 from contextlib import suppress
 from pathlib import Path
 
+from edge.commands.options import within
 from edge.errors import InputError
 from edge.saving import find
 from edge.writing import check_writable
@@ -48,7 +49,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     )
     option(
         "--jobs",
-        type=int,
+        type=within(int, 1, 1000),
         default=os.cpu_count() or 1,
         help="processes (default: all cores)",
     )

@@ -12,7 +12,7 @@ from operator import not_
 from pathlib import Path
 
 import numpy as np
-from joblib import Parallel, delayed
+from joblib import delayed
 
 from edge.arrays import Booleans, Floats
 from edge.errors import InputError
@@ -40,6 +40,7 @@ from train.data.kernels import MOST_TOUCHES, kernel_table
 from train.data.labels import shared_tasks
 from train.data.vectors import Labels, Strings, Vectors
 from train.progress import bar, say
+from train.threads import in_processes
 
 MANY = 2000
 """Recordings from which on a fit says before it begins how much it will take."""
@@ -241,7 +242,7 @@ def read(data: Sequence[str | Path], *, progress: bool = False) -> Recordings:
         )
     digest = hashlib.sha256()
     recordings: list[Recording] = []
-    for path in bar(paths, desc="reading", unit=" trials", disable=not progress):
+    for path in bar(paths, desc="reading", disable=not progress):
         contents = read_bytes(path, LARGEST_BYTES)
         recordings.append(load(path, io.BytesIO(contents)))
         digest.update(contents)
@@ -338,17 +339,11 @@ def load_trials(
         "features": names,
         "joints": posed.joints,
     }
-    work = Parallel(n_jobs=jobs, return_as="generator")(
+    work = [
         delayed(follow)(recording, path, layout, **tracked)
         for recording, path in posed.recordings
-    )
-    trials = bar(
-        work,
-        total=len(posed.recordings),
-        desc="following",
-        unit=" trials",
-        disable=not progress,
-    )
+    ]
+    trials = in_processes(jobs, work, "following" * progress)
     touched = collect(posed.recordings, trials, layout).completed()
     tasks = shared_tasks(touched.labels, partial=partial)
     labelled = touched.labelled(tasks, partial=partial)

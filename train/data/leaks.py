@@ -21,13 +21,14 @@ more than this share of the remainder."""
 
 def without_copies(recordings: Recordings) -> tuple[Recordings, list[str]]:
     """Recordings without others' copies, by which they would be told, and a warning
-    where there are some."""
+    where there are some. What has another label is no copy."""
     originals: dict[bytes, Path] = {}
     copied = []
     kept = []
     for path, recording in zip(recordings.paths, recordings.recordings, strict=True):
         sha = hashlib.sha256(recording.t.tobytes())
         sha.update(recording.frames.tobytes())
+        sha.update(repr(sorted(recording.labels.items())).encode())
         original = originals.setdefault(sha.digest(), path)
         kept.append(original is path or not recording.frames.any())
         if not kept[-1]:

@@ -6,13 +6,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from joblib import Parallel, delayed
+from joblib import delayed
 
 from edge.arrays import Booleans, Floats, Integers
 from edge.model.info import margin
 from train.data.vectors import Strings, Vectors
 from train.model.pipeline import Choices, ContactClassifier, Fits
-from train.threads import single_thread
+from train.threads import in_processes, single_thread
 
 AtPoints = Sequence[Choices]
 """[decision point]{task: Choice}."""
@@ -52,6 +52,7 @@ def held_out(
     folds: Integers,
     runs: Sequence[Sequence[AtPoints]],
     jobs: int = 1,
+    heading: str = "",
 ) -> list[HeldOut]:
     """[run] answers to each trial by models without its fold.
 
@@ -62,12 +63,13 @@ def held_out(
         folds: (n,) from 0, or -1 for trials that are never left out.
         runs: [run][fold][decision point]{task: Choice}.
         jobs: processes.
+        heading: of a progress bar on stderr; empty for none.
     """
-    work = (
+    work = [
         delayed(_fold)(vectors, folds == fold, choices)
         for fold, choices in enumerate(zip(*runs, strict=True))
-    )
-    by_fold = list(Parallel(n_jobs=jobs)(work))
+    ]
+    by_fold = list(in_processes(jobs, work, heading))
     of_runs = []
     for of_run in zip(*by_fold, strict=True):
         result = HeldOut({}, {})

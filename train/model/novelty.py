@@ -30,14 +30,14 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from joblib import Parallel, delayed
+from joblib import delayed
 from scipy.linalg import eigh
 from scipy.spatial.distance import cdist
 
 from edge.arrays import Booleans, Floats, Integers
 from edge.touch.measures import feature
 from train.data.vectors import Strings, Vectors
-from train.threads import single_thread
+from train.threads import in_processes, single_thread
 
 UNUSUAL_RATE = 0.01
 UNKNOWN_RATE = 0.0125
@@ -333,12 +333,12 @@ def held_out_scores(
         telling: (p,) whether columns count; all do where None.
     """
     count = int(folds.max()) + 1
-    work = (
+    work = [
         delayed(_fold_scores)(X, labels, folds == k, widths, telling)
         for k in range(count)
-    )
+    ]
     scores = np.full((2, *X.shape[:2]), np.nan)
-    for k, of_fold in enumerate(Parallel(n_jobs=jobs)(work)):
+    for k, of_fold in enumerate(in_processes(jobs, work)):
         scores[:, :, folds == k] = of_fold
     return Scores(*scores)
 

@@ -123,6 +123,7 @@ class SequentialClassifier:
         early: settings of early decision points; those of the full window where None.
         drawn: whether a scene drew the trained things, so that the model is for other
             arms than the scene's.
+        heading: of progress bars on stderr; empty for none.
 
     Attributes:
         decision_points_: a fitted `ContactClassifier` for each decision point.
@@ -142,6 +143,7 @@ class SequentialClassifier:
     widths: Sequence[int] | None = None
     early: Early | None = None
     drawn: bool = False
+    heading: str = ""
 
     def fit(
         self,
@@ -182,6 +184,7 @@ class SequentialClassifier:
             folds,
             [of_folds, of_all],
             self.jobs,
+            self.heading,
         )
         self.right_ = chosen_without.right
         never_met = self._never_met(taken)
@@ -279,7 +282,7 @@ class SequentialClassifier:
             return {}
         at_end = replace(vectors, X=vectors.X[-1:])
         runs = [[self.choices]] * (int(things.max()) + 1)
-        (answered,) = held_out(at_end, things, [runs], self.jobs)
+        (answered,) = held_out(at_end, things, [runs], self.jobs, self.heading)
         excess = excess_of(self.novelty_, self._left_out.novelty)[-1]
         evidence = {}
         for task, tested in self._tested.items():

@@ -189,7 +189,7 @@ def answers_of(fitted: Fitted, jobs: int = 1) -> dict[str, Answers]:
                 cases.setdefault(key, (by_task, {}))[1][task] = test
     without_fold = partial(_without_fold, vectors)
     of_cases = list(cases.values())
-    results = Workers(jobs, progress=False).map("report", without_fold, of_cases)
+    results = Workers(jobs).map("report", without_fold, of_cases)
     for (_, tests), by_task in zip(of_cases, results, strict=True):
         for task, (answered, explained) in by_task.items():
             answers[task].answers[:, tests[task]] = answered

@@ -4,11 +4,9 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from joblib import Parallel, delayed
+from joblib import delayed
 
-from edge.errors import InputError
-from train.progress import bar
-from train.threads import single_thread
+from train.threads import in_processes, single_thread
 
 
 @dataclass(frozen=True)
@@ -17,20 +15,9 @@ class Workers:
 
     Attributes:
         jobs: number of processes.
-        progress: show progress bars on stderr.
     """
 
     jobs: int = 1
-    progress: bool = True
-
-    def __post_init__(self) -> None:
-        """Refuse a number of processes that cannot work.
-
-        Raises:
-            InputError: it is below 1.
-        """
-        if self.jobs < 1:
-            raise InputError(f"--jobs must be at least 1, not {self.jobs}")
 
     def map(
         self,
@@ -40,21 +27,9 @@ class Workers:
     ) -> list[Any]:
         """The results of function(*case) in the order of the cases; the bar has the
         heading."""
+        calls = [delayed(_single)(function, case) for case in cases]
         # Memory maps would make arrays read-only files, which pays only for large ones.
-        run = Parallel(
-            n_jobs=self.jobs,
-            return_as="generator",
-            max_nbytes=None,
-        )
-        results = run(delayed(_single)(function, case) for case in cases)
-        return list(
-            bar(
-                results,
-                total=len(cases),
-                desc=f"{heading:<22}",
-                disable=not self.progress,
-            )
-        )
+        return list(in_processes(self.jobs, calls, heading, max_nbytes=None))
 
 
 def _single(function: Callable[..., Any], case: tuple[Any, ...]) -> Any:

@@ -10,7 +10,6 @@ from pathlib import Path
 from edge.errors import InputError
 from train.data.dataset import DataSet, Measurement, load_trials
 from train.data.feature_sets import expand
-from train.progress import bar
 from train.report.page import write
 from train.report.section import Section, counted
 from train.report.work import Workers
@@ -95,8 +94,6 @@ def study(
     Raises:
         InputError: the data set cannot be used, or its trials are not of the scene.
     """
-    if seeds < 1:
-        raise InputError(f"--seeds must be at least 1, not {seeds}")
     workers = Workers(jobs)
     source = None if scene is None else scenes.load(scene)
     dataset = _studied(data)
@@ -122,8 +119,7 @@ def _analysed(context: Context, seeds: int) -> list[Section]:
     scene = context.scene
     if scene is not None:
         numbers = [_numbers(applicable)]
-        for i in bar(range(1, seeds), desc="data sets"):
-            numbers.append(_of_another_seed(context, scene, i))
+        numbers += [_of_another_seed(context, scene, i) for i in range(1, seeds)]
         trials = seeds * len(context.dataset.trials)
         applicable.insert(1, paper.comparison(numbers, trials))
     return applicable
@@ -177,9 +173,5 @@ def _of_another_seed(context: Context, scene: Scene, i: int) -> paper.Numbers:
     with tempfile.TemporaryDirectory() as folder:
         simulate(replace(scene, seed=scene.seed + i), folder)
         dataset = load_trials([folder], Measurement(horizon_s=LONGEST_S))
-    quiet = replace(
-        context,
-        dataset=dataset,
-        workers=replace(context.workers, progress=False),
-    )
-    return _numbers([analysis(quiet) for analysis in COMPARED])
+    another = replace(context, dataset=dataset)
+    return _numbers([analysis(another) for analysis in COMPARED])

@@ -116,7 +116,7 @@ def tradeoff(data: Sequence[str], out: Path, board_path: str, options: Options) 
         commands=Commands(
             data=tuple(map(str, data)),
             out=out,
-            quick=options.quick,
+            quick=quick,
             board=Path(board_path),
             task=options.task,
         ),

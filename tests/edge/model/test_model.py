@@ -10,7 +10,7 @@ import onnx
 import pytest
 from onnx import TensorProto, helper, numpy_helper
 
-from edge.errors import InputError
+from edge.errors import InputError, OutOfRange
 from edge.model import onnx_file
 from edge.model.graph import Graph
 from edge.model.info import FORMAT, METADATA_KEY
@@ -376,3 +376,12 @@ def test_a_tie_is_of_two_labels_or_more_with_the_most_votes(
     decision = model.decide(vector)["object"]
     assert decision.tie == tie
     assert decision.votes == max(shares)
+
+
+def test_a_vector_that_one_task_refuses_is_decided_for_none(model, golden, monkeypatch):
+    outputs = model.run(golden["vectors"][:1])
+    for task in model.info.tasks:
+        refused = {**outputs, f"{task}_label": np.array([-1])}
+        monkeypatch.setattr(model, "run", lambda *_, answer=refused: answer)
+        with pytest.raises(OutOfRange, match="too large to be scaled"):
+            model.decide(golden["vectors"][0])

@@ -50,14 +50,12 @@ def test_memory_cold_start_and_machine_are_named(board):
     assert board["cold_start_ms"] > 10.0
     machine = board["machine"]
     assert machine["kind"]
-    assert machine["cores"] >= 1
     assert machine["edge-classify"] == __version__
 
 
 def test_the_model_is_named_by_its_digest(board, model):
     data = Path(model.path).read_bytes()
     assert board["model"]["sha256"] == hashlib.sha256(data).hexdigest()
-    assert board["model"]["bytes"] == len(data)
     assert board["model"]["data_digest"] == model.info.data_digest
 
 

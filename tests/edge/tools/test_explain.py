@@ -17,6 +17,7 @@ def test_a_program_gets_the_trials_by_name_and_the_parts(edge, exported, recordi
     words = (exported / "model.onnx", recordings / "hard_0.npz")
     status, (category, about_object), _ = edge("explain", *words)
     assert status == 0
+    assert edge("explain", "--model", *words)[1] == [category, about_object]
     assert about_object["task"] == "object"
     assert category["task"] == "category"
     assert category["label"] == "rigid-fixed"
@@ -38,7 +39,9 @@ def test_a_person_gets_lines_that_fit(edge, exported, recordings, monkeypatch):
     assert max(map(len, out.splitlines()[1:])) <= 80
 
 
-def test_a_recording_without_contact_is_one_sentence(exported, quiet, refused):
+def test_what_cannot_be_explained_is_one_sentence(exported, quiet, refused):
+    err = refused("explain", exported / "model.onnx")
+    assert "name the recordings to explain after the model" in err
     err = refused("explain", exported / "model.onnx", quiet)
     assert "quiet.npz: holds no contact; leave it out" in err
 

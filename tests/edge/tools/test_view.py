@@ -4,6 +4,7 @@ import os
 import pty
 
 import numpy as np
+import pytest
 
 from edge.tools import view
 from edge.touch.frame import Frame
@@ -11,6 +12,13 @@ from edge.touch.layout import SkinLayout
 from tests.conftest import started
 
 
+@pytest.fixture
+def person(monkeypatch):
+    """Output is for a person, though no terminal plays the recording in real time."""
+    monkeypatch.setattr(view.Output, "of", lambda _: view.Output(as_json=False))
+
+
+@pytest.mark.usefixtures("person")
 def test_view_draws_the_skin_at_a_bounded_rate(edge, exported, recordings):
     options = ("--fake", recordings / "hard_0.npz", "--model", exported / "model.onnx")
     status, text, err = edge("view", *options, text=True)
@@ -25,6 +33,7 @@ def test_view_draws_the_skin_at_a_bounded_rate(edge, exported, recordings):
     assert text.endswith("\x1b[0m\x1b[?25h")
 
 
+@pytest.mark.usefixtures("person")
 def test_view_draws_a_picture_each_time_one_is_due(edge, recordings, monkeypatch):
     """Half a frame early or late, so that a clock that shifts by less does not skip
     one."""
@@ -33,6 +42,11 @@ def test_view_draws_a_picture_each_time_one_is_due(edge, recordings, monkeypatch
     options = ("--fake", recordings / "hard_0.npz", "--seconds", 0.6)
     assert edge("view", *options, text=True)[0] == 0
     assert np.round(np.diff(times), 2).tolist() == [0.1] * 5
+
+
+def test_a_pipe_is_refused(refused, recordings):
+    err = refused("view", "--fake", recordings / "hard_0.npz")
+    assert "give it a terminal or --web; `edge-classify run` prints JSON lines" in err
 
 
 def test_a_terminal_that_goes_away_ends_view_with_a_sentence(recordings):
@@ -90,6 +104,15 @@ def test_two_rows_make_a_line_and_colours_are_sent_where_they_change():
     assert text == (
         "\x1b[38;5;1;48;5;3m▀▀\x1b[38;5;2;48;5;3m▀\x1b[0m\n\x1b[38;5;4;49m▀▀▀\x1b[0m"
     )
+
+
+def test_no_color_draws_digits_by_force(monkeypatch):
+    monkeypatch.setenv("NO_COLOR", "1")
+    colours = np.array([[view.REST[0], view.TOUCH[0]], [view.LOST, view.TOUCH[-1]]])
+    assert view.picture(colours) == "..11\n??BB"
+    text = view.draw(frame((1, 1)), LAYOUT, [])
+    assert "\x1b" not in text
+    assert "1 to B: in contact" in text
 
 
 def test_the_caption_is_for_a_person():

@@ -18,6 +18,7 @@ from edge.touch.kernels import (
     kernel_channels,
     read_tables,
     shares,
+    shifted,
 )
 from edge.touch.layout import SkinLayout
 from tests.edge.touch.pressed import followed, pressed
@@ -193,3 +194,10 @@ def test_a_damaged_table_is_refused(wrong):
     assert read(vars(right)) == {"taxel_kernels": right}
     with pytest.raises(InputError, match="^m: "):
         read(wrong)
+
+
+def test_values_beyond_14_bits_are_cut_off_after_the_shift():
+    channels = np.array([[16383, 16384, 1 << 60], [1, 1 << 13, 1 << 60]])
+    values = shifted(channels, (0, 1))
+    assert values.tolist() == [[16383] * 3, [2, 16383, 16383]]
+    assert shifted(channels, (-4, 14)).tolist() == [[1023, 1024, 16383], [16383] * 3]

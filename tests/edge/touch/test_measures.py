@@ -1,6 +1,7 @@
 """Feature types by name: whole numbers against sums in plain Python, values against
 fractions."""
 
+import math
 from dataclasses import replace
 from fractions import Fraction
 
@@ -19,6 +20,7 @@ from edge.touch.features import feature_vector
 from edge.touch.frame import Frame
 from edge.touch.layout import SkinLayout
 from edge.touch.measures import ZONES, names
+from edge.touch.zones import quantities
 from tests.edge.touch.pressed import active_of, followed, pressed, zones_of
 
 FLAT = SkinLayout(5, 7, threshold_counts=10, onset_counts=10, counts_per_newton=100.0)
@@ -117,14 +119,8 @@ def value(layout: SkinLayout, counts, name: str) -> float:
     return vector[0]
 
 
-@settings(max_examples=40)
-@given(seed=st.integers(0, 1 << 32), density=st.sampled_from([0.1, 0.5, 1.0]))
-def test_moments_are_those_of_exact_arithmetic(seed, density):
-    counts = frame_of(seed, FLAT.shape, density).counts.astype(int)
-    counts[2, 3] = 40000
-    taxels = [
-        (*taxel, counts[*taxel].item()) for taxel in np.argwhere(counts > 10).tolist()
-    ]
+def moments(taxels):
+    """{quantity: the true value} of taxels, each a row, a column and counts."""
     force = sum(f for _, _, f in taxels)
 
     def mean(of) -> Fraction:
@@ -142,25 +138,47 @@ def test_moments_are_those_of_exact_arithmetic(seed, density):
         longer, shorter = (
             mpmath.sqrt(max(v, 0) / 2) for v in (a + b + root, a + b - root)
         )
-    exact = {
-        "force": Fraction(force, 100),
-        "along": row,
-        "around": col,
-        "slant": rc,
-        "spread_along": mpmath.sqrt(a),
-        "spread_around": mpmath.sqrt(b),
-        "length": longer,
-    }
+        return {
+            "along": row,
+            "around": col,
+            "slant": m,
+            "spread_along": mpmath.sqrt(a),
+            "spread_around": mpmath.sqrt(b),
+            "length": longer,
+            "width": shorter,
+        }
+
+
+@settings(max_examples=40)
+@given(seed=st.integers(0, 1 << 32), density=st.sampled_from([0.1, 0.5, 1.0]))
+def test_moments_are_those_of_exact_arithmetic(seed, density):
+    counts = frame_of(seed, FLAT.shape, density).counts.astype(int)
+    counts[2, 3] = 40000
+    taxels = [
+        (*taxel, counts[*taxel].item()) for taxel in np.argwhere(counts > 10).tolist()
+    ]
+    exact = moments(taxels)
+    exact["force"] = sum(f for _, _, f in taxels) / 100
+    # The determinant of a thin contact cancels: see `edge.touch.features`.
+    width = pytest.approx(float(exact.pop("width")), abs=7 * 2.0**-25)
+    assert value(FLAT, counts, "skin_width") == width
     for quantity, truth in exact.items():
         assert value(FLAT, counts, f"skin_{quantity}") == pytest.approx(
             float(truth),
             rel=4e-15,
             abs=1e-14,
         )
-    # The determinant of a thin contact cancels: see `edge.touch.features`.
-    assert value(FLAT, counts, "skin_width") == pytest.approx(
-        float(shorter), abs=7 * 2.0**-25
-    )
+
+
+@pytest.mark.parametrize("far", [1000, 114_000, 2**18])
+def test_moments_beyond_64_bits_are_exact(far):
+    """A thousandth of the force in row 1024, the rest in row 0: the variance times
+    force squared is up to 2^66."""
+    near = 1024 * far
+    sums = [near, 2, near + far, 1024 * far, 0, 2**20 * far, 0, 0]
+    values = quantities(np.array([sums]), SkinLayout(2000, 4, wraps=False))
+    variance = Fraction(2**20 * near * far, (near + far) ** 2)
+    assert values["spread_along"][0] == pytest.approx(math.sqrt(variance), rel=1e-15)
 
 
 def test_a_contact_is_followed_across_the_seam_and_does_not_jump():

@@ -98,6 +98,16 @@ def skin_quantities(layout, frame) -> dict[str, float]:
     return quantities_of(zones_of(layout, frame, ALL)["skin"])
 
 
+def twist_of(row, pitch):
+    """The twist in counts times metres, and the size of its two parts, from a zone's
+    whole numbers."""
+    _, _, force, rows, cols, *_ = row
+    along, around, rows_around, cols_along = row[ZONE_WIDTH:]
+    first = (rows_around - Fraction(rows, force) * around) * Fraction(pitch[0])
+    second = (cols_along - Fraction(cols, force) * along) * Fraction(pitch[1])
+    return first - second, abs(first) + abs(second)
+
+
 @settings(max_examples=60)
 @given(seed=st.integers(0, 1 << 32))
 def test_quantities_are_those_of_fractions(seed):
@@ -105,8 +115,8 @@ def test_quantities_are_those_of_fractions(seed):
     if not active_of(LAYOUT, frame).bits:
         return
     row = zones_of(LAYOUT, frame, ALL)["skin"]
-    _, _, force, rows, cols, *_ = row
-    along, around, rows_around, cols_along = row[ZONE_WIDTH:]
+    force = row[2]
+    along, around, *_ = row[ZONE_WIDTH:]
     quantities = quantities_of(row)
     assert quantities["shear_along"] == along / 100.0
     assert quantities["shear_around"] == around / 100.0
@@ -117,11 +127,8 @@ def test_quantities_are_those_of_fractions(seed):
     assert quantities["shear_ratio"] == pytest.approx(
         float(size) ** 0.5 / force, rel=1e-15
     )
-    first = Fraction(rows_around) - Fraction(rows, force) * around
-    second = Fraction(cols_along) - Fraction(cols, force) * along
-    twist = first * Fraction(0.01) / 100 - second * Fraction(0.02) / 100
-    scale = float(abs(first) * Fraction(0.01) + abs(second) * Fraction(0.02)) / 100
-    assert abs(quantities["twist"] - float(twist)) <= 1e-15 * scale
+    twist, size = twist_of(row, LAYOUT.pitch)
+    assert abs(quantities["twist"] - float(twist / 100)) <= 1e-15 * float(size / 100)
 
 
 def test_an_empty_zone_has_no_shear():
@@ -141,6 +148,13 @@ def test_the_largest_skin_full_of_the_largest_shear_does_not_overflow(wraps):
     ]
     # An even field has no moment about its centroid.
     assert shear.quantities(np.array([row]), layout)["twist"].tolist() == [0.0]
+
+
+def test_a_moment_beyond_64_bits_is_exact():
+    """2^32 times 2^32, and as much again."""
+    large = 2**32
+    row = [0, 1, large, large, 0, 0, 0, 0, 0, -large, large, 0]
+    assert quantities_of(row)["twist"] == 2.0 * large * 0.01 / 100.0
 
 
 def test_features_follow_the_shear_of_a_contact():

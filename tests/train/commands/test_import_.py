@@ -29,7 +29,7 @@ def test_a_constant_offset_is_subtracted_and_nothing_goes_below_zero(make_touch)
 def test_a_name_too_long_to_be_looked_up_is_one_sentence(tmp_path, refusal):
     file = tmp_path / f"{'n' * 300}.csv"
     message = refusal("import", "csv", file, "--out", tmp_path / "out")
-    assert message == f"train: {file}: no such file or folder"
+    assert message == f"edge-classify: {file}: no such file or folder"
 
 
 def test_data_without_thresholds_get_those_of_their_noise(make_touch, tmp_path, capsys):
@@ -68,5 +68,5 @@ def test_warnings_that_are_alike_are_counted(make_touch, tmp_path, capsys):
     assert not leftover.exists()
     lines = capsys.readouterr().err.splitlines()
     (warning,) = [line for line in lines if "its first frame is above" in line]
-    assert warning.startswith(f"train: {out / 'a.npz'}: ")
-    assert "train: 2 more warnings like these" in lines
+    assert warning.startswith(f"edge-classify: {out / 'a.npz'}: ")
+    assert "edge-classify: 2 more warnings like these" in lines

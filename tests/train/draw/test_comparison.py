@@ -81,4 +81,4 @@ def test_touches_in_other_units_do_not_share_an_axis(make_touch, tmp_path):
 
 def test_a_dark_page_is_for_several_recordings(refusal, tmp_path):
     message = refusal("show", TOUCHES[0], "--dark", "--out", tmp_path / "a.png")
-    assert message == "train: --dark is for several recordings"
+    assert message == "edge-classify: --dark is for several recordings"

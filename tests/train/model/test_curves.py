@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.special import expit
 
-from train.model.curves import DOUBT, LEAST_DOUBT, Curve
+from train.model.curves import DOUBT, LEAST_DOUBT, Curve, Evidence, cross_fitted
 
 
 def test_finds_the_curve_that_drew_the_outcomes():
@@ -68,16 +68,18 @@ def test_the_unit_of_the_distances_does_not_matter():
     )
 
 
-@pytest.mark.parametrize("share", [0.0, 0.3])
-def test_the_mean_probability_is_moved_to_a_share(share):
+@pytest.mark.parametrize("share", [0.0, 0.3, 0.9])
+def test_the_mean_probability_is_moved_to_a_share_even_far_away(share):
     rng = np.random.default_rng(4)
-    margins = rng.normal(size=200)
+    margins = 100.0 + rng.normal(size=200)
     excess = rng.exponential(size=200)
-    curve = Curve(2.0, 0.5, 1.0).with_mean(margins, excess, share, np.ones(200))
+    known = np.linspace(0.5, 1.0, 200)
+    curve = Curve(2.0, 0.5, 1.0).with_mean(margins, excess, share, known)
     assert curve.slope == 2.0
     assert curve.doubt == 1.0
-    expected = min(max(share, 0.5 / 200), 1.0 - 0.5 / 200)
-    assert curve.probabilities(margins, excess).mean() == pytest.approx(expected)
+    expected = min(max(share, 0.5 / 200), 0.75 - 0.5 / 200)
+    mean = (curve.probabilities(margins, excess) * known).mean()
+    assert mean == pytest.approx(expected)
 
 
 def test_a_mean_may_lie_beyond_the_greatest_doubt():
@@ -85,3 +87,31 @@ def test_a_mean_may_lie_beyond_the_greatest_doubt():
     level = np.zeros(100)
     curve = Curve(1.0, 0.0, 1.0).with_mean(level, excess, 0.7, np.ones(100))
     assert curve.probabilities(level, excess).mean() == pytest.approx(0.7)
+
+
+def test_a_curve_of_a_point_has_the_mean_of_the_honest_answers_there():
+    rng = np.random.default_rng(6)
+    numbers = rng.random((3, 2, 80))
+    right, honest = rng.random((2, 2, 80)) < [[[0.9]], [[0.6]]]
+    evidence = Evidence(*numbers[:2], right, honest, 0.8 + 0.2 * numbers[2])
+    for point in range(2):
+        margins, excess = numbers[:2, point]
+        mean = honest[point].mean(), evidence.known[point]
+        curve = Curve.of(margins, excess, right[point])
+        assert evidence.at(point).curve() == curve.with_mean(margins, excess, *mean)
+
+
+def test_a_folds_confidences_are_by_the_other_folds_tested_trials_alone():
+    rng = np.random.default_rng(5)
+    margins = rng.normal(size=(2, 60))
+    excess = rng.exponential(size=(2, 60))
+    right = rng.random((2, 60)) < 0.7
+    folds = np.arange(60) % 3
+    tested = np.arange(60) % 5 > 0
+    confidences = cross_fitted(margins, excess, right, folds, tested)
+    for fold in range(3):
+        inside = folds == fold
+        others = tested & ~inside
+        curve = Curve.of(margins[:, others], excess[:, others], right[:, others])
+        expected = curve.probabilities(margins[:, inside], excess[:, inside])
+        assert confidences[:, inside].tolist() == expected.tolist()

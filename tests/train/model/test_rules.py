@@ -20,13 +20,6 @@ from train.model.rules import (
 )
 
 
-@pytest.mark.parametrize(("wrong", "trials"), [(0, 20), (3, 140), (140, 140)])
-def test_the_upper_limit_is_where_the_exact_binomial_test_turns(wrong, trials):
-    limit = upper_limit(wrong, trials, 0.1)
-    assert binom.cdf(wrong, trials, min(limit + 1e-9, 1.0)) <= 0.1 or limit == 1.0
-    assert binom.cdf(wrong, trials, limit - 1e-6) > 0.1
-
-
 class TestStops:
     CONFIDENCE = np.array([[0.9, 0.2, 0.9], [0.9, 0.8, 0.1], [0.1, 0.9, 0.2]])
 
@@ -38,6 +31,7 @@ class TestStops:
 
     def test_at_the_first_decision_point_that_is_sure(self):
         assert self.stop() == [0, 1, 0]
+        assert self.stop(confidence=0.9) == [0, 2, 0]
 
     def test_a_fixed_window_waits_for_it_and_no_longer(self):
         assert self.stop(confidence=NEVER, last=1) == [1, 1, 1]
@@ -106,6 +100,24 @@ def test_certificates_fail_no_oftener_than_they_say():
     assert failed <= binom.ppf(0.99, 100, TEST_SHARE * RISK)
 
 
+def test_equal_rules_are_a_fixed_window_and_certain_error_is_no_rule():
+    """All are wrong at 0.4 s and none is later. Each is sure at 0.8 s."""
+    wrong = np.zeros((3, 100), dtype=bool)
+    wrong[0] = True
+    confidence = np.outer([0.0, 1.0, 1.0], np.ones(100))
+    full, fixed = certify(course(confidence, wrong), SECONDS)
+    assert full == StoppingRule(full.error, 1.2, NEVER, 2)
+    assert (fixed.confidence, fixed.last) == (NEVER, 1)
+
+
+def test_a_task_is_wrong_where_it_names_nothing_when_it_is_decided():
+    right = np.zeros((3, 2), dtype=bool)
+    withheld = np.array([[True, False], [False, False], [False, True]])
+    decided = Course([np.full((3, 2), 0.9)], [right], right, withheld)
+    _, wrong = decided.under(StoppingRule(0.1, 1.0, 0.7, 2))
+    assert wrong.tolist() == [True, False]
+
+
 class TestProduct:
     """Two factors and their product, which is decided when both are."""
 
@@ -166,3 +178,17 @@ class TestProduct:
         wrong = self.product().under(slow)[1]
         limit = upper_limit(int(wrong.sum()), 2, 0.025)
         assert product == [StoppingRule(limit, 1.2, NEVER, 2)]
+        window = StoppingRule(own.error, 1.2, NEVER, 2)
+        _, factor = self.agreeing(own, window)
+        assert factor == [window]
+
+
+def test_a_family_has_half_the_level_and_goes_on_from_its_last_limit():
+    """Of 100 trials 10 are wrong at 0.8 s and none at 0.4 s, which is tested after
+    it."""
+    wrong = np.zeros((3, 100), dtype=bool)
+    wrong[1, :10] = True
+    full, fast = certify(course(np.zeros((3, 100)), wrong), SECONDS)
+    level = TEST_SHARE * RISK
+    assert (full.last, full.error) == (2, upper_limit(0, 100, level))
+    assert (fast.last, fast.error) == (0, upper_limit(10, 100, level / 2))

@@ -7,10 +7,12 @@ from scipy.special import logit
 
 from edge.early import fastest
 from edge.errors import InputError
+from edge.model.info import Novelty
 from train.data.folds import stratified_folds
 from train.model.held_out import answers
 from train.model.pipeline import Choice
 from train.model.stopping import (
+    Early,
     SequentialClassifier,
     excess_of,
 )
@@ -51,6 +53,21 @@ def test_what_is_plain_from_the_second_decision_point_on_is_decided_there():
     new, truth = touches(300, seed=1)
     named, _ = answers(model.decision_points_, new)["t"]
     assert (named[1:] == truth).all()
+
+
+def test_points_before_a_time_have_settings_of_their_own_also_without_a_fold():
+    full, first, of_fold = map(of_neighbours, (1, 2, 3))
+    early = Early(1.2, first, [of_fold])
+    model = SequentialClassifier(full, SECONDS, early=early)
+    assert model.choices_at == [first, first, full]
+    assert model.without([full], early) == [[of_fold, of_fold, full]]
+    assert model.without([full], None) == [[full] * 3]
+
+
+def test_an_excess_is_that_above_half_of_the_trials():
+    scores = np.array([[1.0, 2.0, 2.0 * np.e, np.nan]])
+    excess = excess_of(Novelty((2.0,), (9.0,)), scores)
+    assert excess[0].tolist() == pytest.approx([0.0, 0.0, 1.0, 0.0])
 
 
 def test_rules_ask_for_the_same_margin_at_every_decision_point():
@@ -107,6 +124,19 @@ def test_each_fold_is_answered_by_what_was_chosen_without_it():
     right = model.fit(X, {"t": labels}, folds, without).right_["t"][-1]
     assert right[folds != 0].all()
     assert not right[folds == 0].all()
+    assert model.stopping_["t"].wrong >= (~right).sum()
+
+
+def test_trials_without_a_fold_calibrate_nothing():
+    X, labels = touches(80)
+    folds = stratified_folds(labels)
+    folds[60:] = -1
+    X[:, 60:, 1] += 1e3
+    choices = of_neighbours(3)
+    model = SequentialClassifier(choices, SECONDS, ("max_force",))
+    model.fit(X, {"t": labels}, folds, [choices] * 10)
+    assert model.stopping_["t"].trials == 60
+    assert not model.unusual_[:, 60:].any()
 
 
 def test_trials_that_are_copies_set_no_limit():
@@ -162,6 +192,8 @@ def test_too_few_trials_are_refused():
         InputError, match="calibration needs at least 20 trials, not 19"
     ):
         calibrated(of_neighbours(1), X, {"t": labels})
+    X, labels = touches(20)
+    assert calibrated(of_neighbours(1), X, {"t": labels}).stopping_["t"].trials == 20
 
 
 def test_a_kind_is_no_name_though_it_has_more_labels():

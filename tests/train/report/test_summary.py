@@ -90,8 +90,8 @@ def test_joint_angles_common_to_objects_are_no_leak(recordings, tmp_path):
 
 
 def test_equal_trials_of_different_labels_are_counted(recordings, tmp_path):
-    """One touch stored under three names, twice with its own label and once with
-    another."""
+    """One touch stored under three names, twice with its own label, of which one is left
+    out, and once with another."""
     shutil.copytree(recordings, tmp_path, dirs_exist_ok=True)
     touch = load(recordings / "soft_7.npz")
     save(tmp_path / "again.npz", touch)
@@ -99,7 +99,7 @@ def test_equal_trials_of_different_labels_are_counted(recordings, tmp_path):
     save(tmp_path / "other.npz", replace(touch, meta={**touch.meta, "labels": labels}))
     fitted = train.fit(str(tmp_path), features=["paper"], projection="pca", jobs=1, k=1)
     (sentence,) = warnings_with(fitted, "have the same coordinates")
-    assert sentence.startswith("warning: object: 3 trials have")
+    assert sentence.startswith("warning: object: 2 trials have")
 
 
 def test_a_task_of_one_label_has_no_trial_far_outside(recordings, tmp_path):

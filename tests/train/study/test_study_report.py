@@ -161,7 +161,6 @@ def test_in_a_browser_nothing_overflows_or_is_missing(studied):
     ("words", "sentence"),
     [
         (["--data", "nowhere"], "nowhere"),
-        (["--jobs", "0"], "--jobs must be at least 1"),
         (["--scene", "nowhere.toml"], "nowhere.toml"),
         ([], "needs at least 20 trials, not 16"),
     ],

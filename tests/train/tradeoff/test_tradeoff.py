@@ -57,7 +57,7 @@ def test_windows_are_measured_where_the_curve_is_steep(monkeypatch):
         return {"t": chosen(right[window_s])}
 
     monkeypatch.setattr(choices, "chosen", choice)
-    workers = Workers(progress=False)
+    workers = Workers()
     points = choices.choices_at(None, list(right), "t", workers, quick=True)
     assert list(points) == [0.2, 0.6, 0.8, 0.9, 1.0, 1.2]
     assert made == [0.2, 0.6, 1.2, 0.9, 0.8, 1.0]
@@ -156,7 +156,7 @@ class TestCosts:
         monkeypatch.setattr(costs, "changes", lambda *_: [])
         monkeypatch.setattr(costs, "answered", answered)
         monkeypatch.setattr(costs, "WAITS_S", ())
-        workers = Workers(progress=False)
+        workers = Workers()
         (row,) = costs.measure(None, dataset, {1.2: full}, 100.0, workers, quick=False)
         assert row["change"] == "all candidates"
         assert row["t, points"].startswith("+25 (")
@@ -359,12 +359,6 @@ def written(tmp_path_factory):
         patch.setattr(costs, "coarser", lambda *_: [])
         report = running.tradeoff([data], folder / "out", str(path), options)
     return Written(report, digest)
-
-
-def test_no_process_is_one_sentence(tmp_path, refusal):
-    words = "--data", tmp_path, "--board", tmp_path / "board.json", "--jobs", 0
-    message = refusal("tradeoff", *words, "--out", tmp_path / "out")
-    assert message.endswith("--jobs must be at least 1, not 0")
 
 
 def test_the_report_needs_no_other_page(written):

@@ -1,0 +1,94 @@
+"""Policies of early decisions: a product is decided by its factors' decisions."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from edge.early import Early, Product, is_sure, policies, refusal
+from edge.events import Decided
+from edge.model.info import Stopping, StoppingRule, Task
+from edge.model.model import Decision
+
+
+def task(*labels, **factors):
+    return Task(labels, 1, 1, "none", 1.0, factors=factors)
+
+
+TASKS = {
+    "category": task("x-a", "y-a", "y-b", first=(0, 1, 1), second=(0, 0, 1)),
+    "first": task("x", "y"),
+    "second": task("a", "b"),
+}
+OWN = Decision("x-a", 0.2, 1.0, *[np.zeros(1)] * 3, False, np.zeros(3))
+CANDIDATE = Decided("category", "x-a", 0.2, 0.6, 0.0, 1.0, ("tie",), decision=OWN)
+
+
+def test_a_label_is_sure_from_the_rules_confidence_on_and_less_so_in_doubt():
+    stopping = Stopping((), (), (), 1.0, 0.0, 1.0, (), 20, 0, 0.1)
+    rule = StoppingRule(0.1, 1.0, 0.5, 2)
+    assert is_sure(stopping, rule, [0.0, 2.0], 0, 2.0)
+    assert not is_sure(stopping, rule, [0.0, 2.0], 0, 2.01)
+
+
+SURE = StoppingRule(0.1, 0.6, 0.7, 2)
+FIXED = StoppingRule(0.1, 0.6, 2.0, 1)
+
+
+def test_more_trials_do_not_certify_an_error_that_is_made():
+    stopping = Stopping((), (), (), 1.0, 0.0, 1.0, (SURE,), 20, 2, 0.1)
+    assert "more trials alone will not do" in refusal(stopping, 0.1)
+    assert "0.11 needs about" in refusal(stopping, 0.11)
+
+
+def answered(first, second, stops=("confidence",) * 2, rule=SURE):
+    """The product's answer once its factors have these, with 0.9 and 0.8."""
+    info = SimpleNamespace(tasks=TASKS, stopping={"category": None})
+    policy = Product(info, "category", rule, 0.1)
+    decided = {}
+    pairs = zip(("first", "second"), (first, second), (0.9, 0.8), stops, strict=True)
+    for name, label, confidence, stop in pairs:
+        decided[name] = Decided(name, label, confidence, 0.6, 0.0, 1.0, stopped_by=stop)
+    return policy.answer(CANDIDATE, 1, decided)
+
+
+def test_a_product_has_its_factors_labels_and_the_product_of_their_confidences():
+    answer = answered("y", "b")
+    assert answer.label == answer.decision.label == "y-b"
+    assert answer.confidence == 0.72
+    assert answer.error == 0.1
+    assert answer.flags == ()
+
+
+@pytest.mark.parametrize(
+    ("stops", "stopped_by"),
+    [
+        (("confidence", "confidence"), "confidence"),
+        (("confidence", "window"), "window"),
+        (("window", "confidence"), "window"),
+    ],
+)
+def test_a_product_is_sure_where_both_factors_are(stops, stopped_by):
+    answer = answered("y", "a", stops=stops)
+    assert answer.stopped_by == stopped_by
+    assert ("unsure" in answer.flags) == (stopped_by == "window")
+    assert "unsure" not in answered("y", "a", stops, FIXED).flags
+
+
+@pytest.mark.parametrize(("rule", "kind"), [(SURE, Product), (FIXED, Early)])
+def test_a_product_needs_its_factors_unless_it_waits_for_a_fixed_window(rule, kind):
+    points = (0.3, 0.6, 1.2)
+    info = SimpleNamespace(
+        tasks=TASKS,
+        products={"category": {}},
+        decision_points_s=points,
+        stopping={"category": SimpleNamespace(rules=[rule])},
+    )
+    (policy,) = policies(SimpleNamespace(info=info), 0.1).values()
+    assert type(policy) is kind
+
+
+def test_a_pair_that_was_never_met_has_no_name():
+    answer = answered("x", "b")
+    assert answer.label is None
+    assert answer.confidence == 0.0

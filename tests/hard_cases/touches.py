@@ -1,0 +1,101 @@
+"""Kernels, moments and shear of touches with large numbers."""
+
+from fractions import Fraction
+
+import numpy as np
+from hypothesis import strategies as st
+
+from edge.touch.frame import Frame
+from edge.touch.kernels import SAMPLES, KernelTable, shares
+from edge.touch.layout import SkinLayout
+from edge.touch.zones import quantities
+from tests.edge.touch.pressed import zones_of
+from tests.edge.touch.test_kernels import by_hand
+from tests.edge.touch.test_measures import moments
+from tests.edge.touch.test_shear import twist_of
+from tests.hard_cases.cases import SEEDS, Case, Ladder
+
+COLS = 8
+PITCH = (0.01, 0.02)
+
+
+def kernels_error(bits, seed):
+    """Shares of kernels on five channels of so many bits that are not those of a loop
+    of whole numbers."""
+    rng = np.random.default_rng(seed)
+    channels = rng.integers(0, 1 << bits, (5, SAMPLES)) >> rng.integers(0, 9, (5, 1))
+    shifts = np.clip(rng.integers(11, 16, 5) - bits, -48, 14)
+    biases = rng.integers(-(1 << 17), 1 << 17, 504)
+    table = KernelTable(tuple(shifts.tolist()), tuple(biases.tolist()))
+    expected = [above / counted for above, counted in by_hand(channels, table)]
+    return float((shares(channels, table) != expected).sum())
+
+
+def zone(rows, seed):
+    """Random taxels of a skin with so many rows (row, column, counts), the whole
+    numbers of their zone, and its quantities."""
+    rng = np.random.default_rng(seed)
+    shape = (rows, COLS)
+    layout = SkinLayout(rows, COLS, False, PITCH, threshold_counts=10, axes=3)
+    counts = rng.integers(11, 65536, shape) * (rng.random(shape) < 0.3)
+    counts[rng.integers(0, rows), 0] = 65535
+    shear = rng.integers(-32768, 32768, (*shape, 2))
+    frame = Frame(0.0, counts.astype(np.uint16), shear=shear.astype(np.int16))
+    numbers = zones_of(layout, frame, ["skin_force", "skin_twist"])["skin"]
+    taxels = [(*place, counts[*place].item()) for place in np.argwhere(counts).tolist()]
+    values = quantities(np.array([numbers]), layout)
+    return taxels, numbers, {name: float(v[0]) for name, v in values.items()}
+
+
+def moments_error(rows, seed):
+    """Largest error of a zone's spreads, slant and length, over their size."""
+    taxels, _, measured = zone(rows, seed)
+    true = moments(taxels)
+    sizes = {name: true[name] for name in ("spread_along", "spread_around", "length")}
+    sizes["slant"] = sizes["spread_along"] * sizes["spread_around"]
+    errors = [abs(measured[n] - true[n]) / size for n, size in sizes.items() if size]
+    return float(max(errors, default=0.0))
+
+
+def shear_error(rows, seed):
+    """Error of the twist, over the size of its two parts."""
+    _, numbers, measured = zone(rows, seed)
+    twist, size = twist_of(numbers, PITCH)
+    return float(abs(Fraction(measured["twist"]) - twist) / (size or 1))
+
+
+LONGER = Ladder("rows of taxels", [16, 64, 256, 1024, 4096], "rows", "16 and 12")
+LENGTHS = {"rows": st.sampled_from([1, 2, 16, 300]), "seed": SEEDS}
+
+CASES = [
+    Case(
+        "kernels: channels of many bits, shifted and cut off",
+        "a loop of Python's whole numbers",
+        "shares that differ",
+        kernels_error,
+        [{"bits": 40, "seed": 0}],
+        {"bits": st.integers(1, 48), "seed": SEEDS},
+        Ladder("bits", [8, 16, 32, 48, 62], "bits", "up to 30"),
+        examples=6,
+    ),
+    Case(
+        "moments: spreads, slant and length of scattered taxels",
+        "fractions, roots to 50 digits",
+        "error over the size",
+        moments_error,
+        [{"rows": 16, "seed": 0}],
+        LENGTHS,
+        LONGER,
+        bound=1e-15,
+    ),
+    Case(
+        "shear: the twist of scattered taxels",
+        "fractions",
+        "error over its two parts",
+        shear_error,
+        [{"rows": 16, "seed": 0}],
+        LENGTHS,
+        LONGER,
+        bound=1e-15,
+    ),
+]
