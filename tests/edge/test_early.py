@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from edge.early import Early, Product, is_sure, policies, refusal
+from edge.early import Product, is_sure, refusal
 from edge.events import Decided
 from edge.model.info import Stopping, StoppingRule, Task
 from edge.model.model import Decision
@@ -73,19 +73,6 @@ def test_a_product_is_sure_where_both_factors_are(stops, stopped_by):
     assert answer.stopped_by == stopped_by
     assert ("unsure" in answer.flags) == (stopped_by == "window")
     assert "unsure" not in answered("y", "a", stops, FIXED).flags
-
-
-@pytest.mark.parametrize(("rule", "kind"), [(SURE, Product), (FIXED, Early)])
-def test_a_product_needs_its_factors_unless_it_waits_for_a_fixed_window(rule, kind):
-    points = (0.3, 0.6, 1.2)
-    info = SimpleNamespace(
-        tasks=TASKS,
-        products={"category": {}},
-        decision_points_s=points,
-        stopping={"category": SimpleNamespace(rules=[rule])},
-    )
-    (policy,) = policies(SimpleNamespace(info=info), 0.1).values()
-    assert type(policy) is kind
 
 
 def test_a_pair_that_was_never_met_has_no_name():

@@ -55,13 +55,10 @@ def test_what_is_plain_from_the_second_decision_point_on_is_decided_there():
     assert (named[1:] == truth).all()
 
 
-def test_points_before_a_time_have_settings_of_their_own_also_without_a_fold():
-    full, first, of_fold = map(of_neighbours, (1, 2, 3))
-    early = Early(1.2, first, [of_fold])
-    model = SequentialClassifier(full, SECONDS, early=early)
+def test_points_before_the_full_window_have_settings_of_their_own():
+    full, first = map(of_neighbours, (1, 2))
+    model = SequentialClassifier(full, SECONDS, early=Early(first, []))
     assert model.choices_at == [first, first, full]
-    assert model.without([full], early) == [[of_fold, of_fold, full]]
-    assert model.without([full], None) == [[full] * 3]
 
 
 def test_an_excess_is_that_above_half_of_the_trials():
