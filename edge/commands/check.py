@@ -81,7 +81,14 @@ def remarks(file: SkinFile) -> Iterator[str]:
     uncovered = file.layout.rows * file.layout.cols - len(file.served)
     if uncovered:
         yield f"taxels without a chip, which are never valid: {uncovered}"
-    yield from _remarks_of_muxes(file)
+    for bus in file.buses:
+        muxes = {chip.mux for chip in bus.chips} - {None}
+        if len(muxes) > 1:
+            yield (
+                f"{bus.device} has {len(muxes)} muxes: while one of them may have a "
+                "channel open, nothing behind the others is valid; use one mux, and wire "
+                "its reset line"
+            )
     if file.calibration is None:
         yield f"not calibrated yet: run `edge-classify calibrate --skin {file.path}`"
         return
@@ -91,17 +98,6 @@ def remarks(file: SkinFile) -> Iterator[str]:
             f"{counted(hidden, 'chip')} could freeze unseen: their noise is hidden by "
             "whole counts, so that equal readings prove nothing"
         )
-
-
-def _remarks_of_muxes(file: SkinFile) -> Iterator[str]:
-    for bus in file.buses:
-        muxes = {chip.mux for chip in bus.chips} - {None}
-        if len(muxes) > 1:
-            yield (
-                f"{bus.device} has {len(muxes)} muxes: while one of them may have a "
-                "channel open, nothing behind the others is valid; use one mux, and wire "
-                "its reset line"
-            )
 
 
 def check_board(output: Output) -> int:
