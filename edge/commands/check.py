@@ -124,7 +124,9 @@ def run(arguments: argparse.Namespace) -> int:
     if arguments.skin is None:
         return check_board(output)
     file = load(arguments.skin)
-    frame_bits, rate_hz = wires(file, arguments.overhead)
+    from edge.fake import player  # a check of the board needs no chips
+
+    rate_hz = player.frame_rate(file, arguments.overhead * 1e-6)
     wrong = list(faults(file))
     remarked = list(remarks(file))
     target_hz = file.reading.rate_hz
@@ -137,7 +139,7 @@ def run(arguments: argparse.Namespace) -> int:
     rows, cols = file.layout.shape
     chips = counted(len(file.chips), "chip")
     lines = [f"{arguments.skin}: {file.name}, {rows} x {cols} taxels on {chips}"]
-    for bus, bits in zip(file.buses, frame_bits, strict=True):
+    for bus, bits in zip(file.buses, player.frame_bits(file), strict=True):
         entry = {"device": bus.device, "chips": len(bus.chips)}
         buses.append({**entry, "clock_hz": bus.clock_hz, "bits": bits})
         lines.append(
@@ -165,15 +167,3 @@ def run(arguments: argparse.Namespace) -> int:
     }
     output.event(event, "\n".join(lines))
     return 1 if wrong else 0
-
-
-def wires(file: SkinFile, overhead_us: float) -> tuple[list[float], float]:
-    """Count the bits of a frame on each bus while the drivers read fake chips.
-
-    Returns:
-        The bits, and the frames a second that the wires carry with the software's time
-        for each transaction.
-    """
-    from edge.fake import player  # a check of the board needs no chips
-
-    return player.frame_bits(file), player.frame_rate(file, overhead_us * 1e-6)
