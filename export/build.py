@@ -137,7 +137,10 @@ class Builder:
         """Add an operator, as `node`; returns the names of its outputs."""
         place = len(self.made)
         names = [name or f"{operator} {place} {i}" for i, name in enumerate(outputs)]
-        made = helper.make_node(operator, self._names(inputs), names, **attributes)
+        # skl2onnx orders nodes by their names, and those without one by their addresses.
+        made = helper.make_node(
+            operator, self._names(inputs), names, name=str(place), **attributes
+        )
         self.made.append(made)
         return names
 
