@@ -95,7 +95,8 @@ class Builder:
         return self.node("Cast", stored, to=TensorProto.DOUBLE)
 
     def shifted(self, x: str, y: str, shifts: Sequence[int]) -> str:
-        """Name of a whole product of matrices, divided by 2^shift and rounded."""
+        """Name of a whole product of matrices, divided by 2^shift and rounded, with a
+        shift for each decision point, or one for all."""
         factors = self.by_decision_point([2.0**-shift for shift in shifts])
         product = self.node("MatMul", x, y)
         return self.node("Round", self.node("Mul", product, factors))
@@ -136,7 +137,10 @@ class Builder:
         """Add an operator, as `node`; returns the names of its outputs."""
         place = len(self.made)
         names = [name or f"{operator} {place} {i}" for i, name in enumerate(outputs)]
-        made = helper.make_node(operator, self._names(inputs), names, **attributes)
+        # skl2onnx orders nodes by their names, and those without one by their addresses.
+        made = helper.make_node(
+            operator, self._names(inputs), names, name=str(place), **attributes
+        )
         self.made.append(made)
         return names
 
@@ -145,7 +149,7 @@ class Builder:
 
     def clipped(self, x: str, limits: Sequence[float]) -> tuple[str, str]:
         """Whole numbers (n, m) cut off at plus and minus a limit for each decision
-        point.
+        point, or one for all.
 
         Returns:
             Names of the numbers, and of their summed excess (n, 1), which is 0 within
@@ -176,8 +180,7 @@ def product(
     centred = build.node("Sub", x, means)
     gains = [p.gain_ / p.grid_.step for p in decision_points]
     scaled = build.node("Mul", centred, build.by_decision_point(gains))
-    limits = [MOST_STEPS] * len(decision_points)
-    steps, far = build.clipped(build.node("Round", scaled), limits)
+    steps, far = build.clipped(build.node("Round", scaled), [MOST_STEPS])
     # A step over a unit is a power of two, so that the products' sums are still exact.
     weights = [p.weights_ * (p.grid_.step / p.grid_.unit) for p in decision_points]
     columns = build.by_decision_point_small(widened(weights, components))

@@ -20,7 +20,6 @@ from edge.model.model import Model
 from edge.touch import measures, transforms
 from edge.touch.cells import KERNEL_CELLS, Cells
 from edge.touch.contact import feature_types
-from edge.touch.feature import Feature
 from edge.touch.kernels import BIASES, KernelTable, mixes
 from edge.touch.layout import SkinLayout
 from edge.touch.zones import Zones
@@ -163,7 +162,7 @@ class Source:
                 file.write(text.encode())
 
     def _features(self) -> int:
-        """The features; how many doubles they are measured in."""
+        """The `ec_feature` of each feature; how many doubles they are measured in."""
         rows = []
         largest = 0
         for feature, width in zip(self._types, self._info.widths, strict=True):
@@ -172,24 +171,20 @@ class Source:
             if feature.summary not in ("", "rate"):
                 count = width
                 largest = max(largest, count * samples)
-            rows.append(self._feature(feature, samples, count))
+            alone = (feature.zone, feature.quantity) in ALONE
+            of_region = "REGION_" * (alone and feature.zone == "contact")
+            row = [
+                transforms.floor_of(feature, self._layout),
+                samples,
+                count,
+                "EC_NO_ZONE" if alone else f"EC_{feature.zone.upper()}",
+                f"EC_Q_{of_region}{feature.quantity.upper()}",
+                [f"EC_T_{kind.upper()}" for kind in feature.transforms],
+                f"EC_S_{feature.summary.upper()}",
+            ]
+            rows.append(row)
         self.values["features"] = rows
         return largest + (len(measures.QUANTITIES) + 4) * self._frames
-
-    def _feature(self, feature: Feature, samples: int, rows: int) -> list[object]:
-        """The `ec_feature` of a feature."""
-        alone = (feature.zone, feature.quantity) in ALONE
-        of_region = "REGION_" * (alone and feature.zone == "contact")
-        kinds = [f"EC_T_{kind.upper()}" for kind in feature.transforms]
-        return [
-            transforms.floor_of(feature, self._layout),
-            samples,
-            rows,
-            "EC_NO_ZONE" if alone else f"EC_{feature.zone.upper()}",
-            f"EC_Q_{of_region}{feature.quantity.upper()}",
-            kinds,
-            f"EC_S_{feature.summary.upper()}",
-        ]
 
     def _kernels(self) -> None:
         """The tables of the features that are made of kernels."""

@@ -218,33 +218,23 @@ def run(arguments: argparse.Namespace) -> int:
             suited(former, recording, str(file))
     with single_thread():
         fitted = _fit(arguments)
-        return _written(arguments, fitted, former, held_out)
+        path = arguments.out / "model.onnx"
+        size = save(path, fitted, arguments.name)
+        prices = measure(fitted)
+        labels = [trial.labels for trial in fitted.dataset.trials]
+        print("\n".join(counts_text(labels)), end="\n\n", file=sys.stderr)
+        print(summary(fitted, prices), file=sys.stderr)
+        print(f"{path} ({size / 1024:.0f} kB)\n{path.with_name('golden.npz')}")
+        if arguments.report:
+            from train.report.model_report import write  # loads matplotlib
 
+            print(write(arguments.out, fitted, Model(path), prices, arguments.jobs))
+        if arguments.c:
+            from export.c_code import export
 
-def _written(
-    arguments: argparse.Namespace,
-    fitted: Fitted,
-    former: Model | None,
-    held_out: Sequence[Path],
-) -> int:
-    """Write a fitted model, and report."""
-    path = arguments.out / "model.onnx"
-    size = save(path, fitted, arguments.name)
-    prices = measure(fitted)
-    labels = [trial.labels for trial in fitted.dataset.trials]
-    print("\n".join(counts_text(labels)), end="\n\n", file=sys.stderr)
-    print(summary(fitted, prices), file=sys.stderr)
-    print(f"{path} ({size / 1024:.0f} kB)\n{path.with_name('golden.npz')}")
-    if arguments.report:
-        from train.report.model_report import write  # loads matplotlib
-
-        print(write(arguments.out, fitted, Model(path), prices, arguments.jobs))
-    if arguments.c:
-        from export.c_code import export
-
-        print(export(Model(path), arguments.c, arguments.c_error, arguments.flash))
-    if held_out:
-        print(held_out_text(Model(path), former, held_out), file=sys.stderr)
+            print(export(Model(path), arguments.c, arguments.c_error, arguments.flash))
+        if held_out:
+            print(held_out_text(Model(path), former, held_out), file=sys.stderr)
     return 0
 
 
@@ -276,11 +266,24 @@ def _check_apart(data: list[str], held_out: Sequence[Path]) -> None:
 
 
 def _fit(arguments: argparse.Namespace) -> Fitted:
-    """Fit as the options say."""
+    """Fit as the options say, which may be at a point of `make tradeoff`."""
     window_s = arguments.window
     quick = arguments.quick
     if arguments.front is not None:
-        front, point = _of_front(arguments)
+        fixed = [f"--{name}" for name in FIXED if getattr(arguments, name) is not None]
+        if fixed:
+            raise InputError(
+                f"--front makes the model that was measured; drop {', '.join(fixed)}"
+            )
+        digest = read(arguments.data).digest
+        front = fronts.ParetoFront.read(arguments.fronts, digest)
+        point = front.pick(arguments.front)
+        print(
+            f"{arguments.front}: a window of {point.window_s:g} s, {front.task} "
+            f"{point.accuracy:.1%} ({100 * point.low:.0f} to {100 * point.high:.0f}) in "
+            f"{point.milliseconds:.0f} ms",
+            file=sys.stderr,
+        )
         window_s = point.window_s
         quick = front.quick
     points = arguments.decision_points
@@ -320,26 +323,6 @@ def _scored(model: Model, recordings: Sequence[Path]) -> Summary:
         recording = load(file)
         summary.add(recording.labels, decide(model, recording, str(file)), str(file))
     return summary
-
-
-def _of_front(
-    arguments: argparse.Namespace,
-) -> tuple[fronts.ParetoFront, fronts.OperatingPoint]:
-    """The front of `make tradeoff`, and the operating point that was asked for."""
-    fixed = [f"--{name}" for name in FIXED if getattr(arguments, name) is not None]
-    if fixed:
-        raise InputError(
-            f"--front makes the model that was measured; drop {', '.join(fixed)}"
-        )
-    front = fronts.ParetoFront.read(arguments.fronts, read(arguments.data).digest)
-    point = front.pick(arguments.front)
-    print(
-        f"{arguments.front}: a window of {point.window_s:g} s, {front.task} "
-        f"{point.accuracy:.1%} ({100 * point.low:.0f} to {100 * point.high:.0f}) in "
-        f"{point.milliseconds:.0f} ms",
-        file=sys.stderr,
-    )
-    return front, point
 
 
 def parse_decision_points(text: str, window_s: float) -> tuple[float, ...]:

@@ -158,7 +158,13 @@ def _build(model: Fitted) -> Builder:
         spaces = _spaces(points, task)
         if spaces not in projected:
             projected[spaces] = project(build, spaces, points[-1].n_features_in_)
-    _out_of_range(build, [off for _, off in projected.values()])
+    # The excess itself is a sum of fractions, whose last bits depend on the order of
+    # summation. Whether it is above 0 does not.
+    excesses = [off for _, off in projected.values()]
+    most = reduce(partial(build.node, "Max"), excesses)
+    within = build.node("LessOrEqual", most, 0.0)
+    beyond = build.node("Where", within, 0.0, 1.0)
+    build.node("Squeeze", beyond, [1], output="out_of_range")
     if isinstance(model, SequentialClassifier):
         _doubt(build, model.space_)
     for task in model.choices:
@@ -217,18 +223,6 @@ def _task(
         _label_distances(build, task, squares, labels, scales)
 
 
-def _out_of_range(build: Builder, excesses: Sequence[str]) -> None:
-    """Nodes that say whether any space cut something off: 1, or 0.
-
-    The excess (n, 1) itself is a sum of fractions, whose last bits depend on the order
-    of summation. Whether it is above 0 does not.
-    """
-    most = reduce(partial(build.node, "Max"), excesses)
-    within = build.node("LessOrEqual", most, 0.0)
-    beyond = build.node("Where", within, 0.0, 1.0)
-    build.node("Squeeze", beyond, [1], output="out_of_range")
-
-
 def _doubt(build: Builder, space: NoveltySpace) -> None:
     """Nodes that score how unlike all training trials features (n, p) are, by their
     novelty and remoteness; see `train.model.novelty`."""
@@ -237,15 +231,15 @@ def _doubt(build: Builder, space: NoveltySpace) -> None:
     centred = build.node("Sub", "features", means)
     gains = build.by_decision_point_small([p.gain for p in points])
     rounded = build.node("Round", build.node("Mul", centred, gains))
-    steps, _ = build.clipped(rounded, [CLIP * 2.0**STEP_BITS] * len(points))
+    steps, _ = build.clipped(rounded, [CLIP * 2.0**STEP_BITS])
     weights = build.by_decision_point_small([space.weights])
-    z = build.shifted(steps, weights, [space.shift] * len(points))
+    z = build.shifted(steps, weights, [space.shift])
     squares = build.squared_length(steps)
     outside = build.node("Sub", squares, build.squared_length(z))
     outside = build.node("Max", outside, 1.0)
     whitening = build.by_decision_point_small([p.whitening for p in points])
     y = build.shifted(z, whitening, [p.shift for p in points])
-    y, _ = build.clipped(y, [FARTHEST] * len(points))
+    y, _ = build.clipped(y, [FARTHEST])
     # Twice the rows, so that |row|^2 - 2 row.y needs no further product.
     columns = build.by_decision_point_small(
         [-2.0 * p.rows.T for p in points], "columns of novelty"

@@ -46,15 +46,13 @@ def look(root: Path = Path("/")) -> Iterator[Row]:
         try:
             yield Row(package, version(package))
         except PackageNotFoundError:
-            yield _missing(package)
+            if package == "onnxruntime" and sys.maxsize <= 2**32:
+                note = "missing; numpy runs the models on this 32-bit system"
+                yield Row(package, note)
+            else:
+                yield Row(package, "missing", f"run `pip install {package}`")
     yield from _devices(root)
     yield from _state()
-
-
-def _missing(package: str) -> Row:
-    if package == "onnxruntime" and sys.maxsize <= 2**32:
-        return Row(package, "missing; numpy runs the models on this 32-bit system")
-    return Row(package, "missing", f"run `pip install {package}`")
 
 
 def _state() -> Iterator[Row]:

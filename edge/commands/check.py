@@ -81,7 +81,14 @@ def remarks(file: SkinFile) -> Iterator[str]:
     uncovered = file.layout.rows * file.layout.cols - len(file.served)
     if uncovered:
         yield f"taxels without a chip, which are never valid: {uncovered}"
-    yield from _remarks_of_muxes(file)
+    for bus in file.buses:
+        muxes = {chip.mux for chip in bus.chips} - {None}
+        if len(muxes) > 1:
+            yield (
+                f"{bus.device} has {len(muxes)} muxes: while one of them may have a "
+                "channel open, nothing behind the others is valid; use one mux, and wire "
+                "its reset line"
+            )
     if file.calibration is None:
         yield f"not calibrated yet: run `edge-classify calibrate --skin {file.path}`"
         return
@@ -91,17 +98,6 @@ def remarks(file: SkinFile) -> Iterator[str]:
             f"{counted(hidden, 'chip')} could freeze unseen: their noise is hidden by "
             "whole counts, so that equal readings prove nothing"
         )
-
-
-def _remarks_of_muxes(file: SkinFile) -> Iterator[str]:
-    for bus in file.buses:
-        muxes = {chip.mux for chip in bus.chips} - {None}
-        if len(muxes) > 1:
-            yield (
-                f"{bus.device} has {len(muxes)} muxes: while one of them may have a "
-                "channel open, nothing behind the others is valid; use one mux, and wire "
-                "its reset line"
-            )
 
 
 def check_board(output: Output) -> int:
@@ -128,7 +124,9 @@ def run(arguments: argparse.Namespace) -> int:
     if arguments.skin is None:
         return check_board(output)
     file = load(arguments.skin)
-    frame_bits, rate_hz = wires(file, arguments.overhead)
+    from edge.fake import player  # a check of the board needs no chips
+
+    rate_hz = player.frame_rate(file, arguments.overhead * 1e-6)
     wrong = list(faults(file))
     remarked = list(remarks(file))
     target_hz = file.reading.rate_hz
@@ -141,7 +139,7 @@ def run(arguments: argparse.Namespace) -> int:
     rows, cols = file.layout.shape
     chips = counted(len(file.chips), "chip")
     lines = [f"{arguments.skin}: {file.name}, {rows} x {cols} taxels on {chips}"]
-    for bus, bits in zip(file.buses, frame_bits, strict=True):
+    for bus, bits in zip(file.buses, player.frame_bits(file), strict=True):
         entry = {"device": bus.device, "chips": len(bus.chips)}
         buses.append({**entry, "clock_hz": bus.clock_hz, "bits": bits})
         lines.append(
@@ -169,15 +167,3 @@ def run(arguments: argparse.Namespace) -> int:
     }
     output.event(event, "\n".join(lines))
     return 1 if wrong else 0
-
-
-def wires(file: SkinFile, overhead_us: float) -> tuple[list[float], float]:
-    """Count the bits of a frame on each bus while the drivers read fake chips.
-
-    Returns:
-        The bits, and the frames a second that the wires carry with the software's time
-        for each transaction.
-    """
-    from edge.fake import player  # a check of the board needs no chips
-
-    return player.frame_bits(file), player.frame_rate(file, overhead_us * 1e-6)

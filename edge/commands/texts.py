@@ -49,22 +49,19 @@ def _onset(line: Line) -> str:
     return _at(line["onset_s"], f"contact{_contact(line)}")
 
 
-def _label(line: Line) -> str:
-    """The label of a decision, or why it has none."""
-    unnamed = "unknown" if "unknown" in line["flags"] else "out of range"
-    return unnamed if line["label"] is None else str(line["label"])
-
-
 def _decision(line: Line) -> str:
-    """The time of a decision, its task, label, confidence and flags."""
-    label = _label(line)
+    """The time of a decision, its task, label or why it has none, confidence and
+    flags."""
+    label = line["label"]
+    if label is None:
+        label = "unknown" if "unknown" in line["flags"] else "out of range"
     notes = [", ".join(line["flags"])] if line["flags"] else []
     if "unusual" in line:
         notes.append(line["unusual"])
     if "strongest" in line:
         share = f"{line['strongest']:.0%}"
         notes.append(f"the strongest taxel came to {share} of the onset")
-    if "expected" in line and line["expected"] != line["label"]:
+    if line.get("expected", line["label"]) != line["label"]:
         notes.append(f"labelled {line['expected']}")
     time = line["onset_s"] + line["window_s"]
     number = _contact(line)

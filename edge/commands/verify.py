@@ -11,7 +11,7 @@ from dataclasses import asdict
 from edge.commands.options import add_engine
 from edge.commands.output import LOG, Output
 from edge.model.model import Model
-from edge.model.verify import Check, golden_of, verify
+from edge.model.verify import golden_of, verify
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
@@ -33,21 +33,16 @@ def run(arguments: argparse.Namespace) -> int:
     width = max(len(check.name) for check in checks)
     for check in checks:
         event = {"event": "check", **asdict(check), "passed": check.passed}
-        output.event(event, _text(check, width))
+        verdict = "ok" if check.passed else "DIFFERS"
+        text = f"{verdict:<8} {check.name:<{width}} {check.rows:>6} rows"
+        if not check.passed:
+            value = " ".join(check.seen.split())
+            expected = " ".join(check.expected.split())
+            text += f"; the first is row {check.row}: {value} instead of {expected}"
+        output.event(event, text)
     failed = [check.name for check in checks if not check.passed]
     if failed:
         LOG.error(f"results that differ from the golden file: {', '.join(failed)}")
     else:
         output.text(f"all {len(checks)} results agree with the golden file")
     return 1 if failed else 0
-
-
-def _text(check: Check, width: int) -> str:
-    """The line of a check for people, whose name takes a width."""
-    verdict = "ok" if check.passed else "DIFFERS"
-    text = f"{verdict:<8} {check.name:<{width}} {check.rows:>6} rows"
-    if check.passed:
-        return text
-    value = " ".join(check.seen.split())
-    expected = " ".join(check.expected.split())
-    return f"{text}; the first is row {check.row}: {value} instead of {expected}"

@@ -1,8 +1,5 @@
 """A model of the AD7147-1 for the fake bus."""
 
-import random
-from typing import Self
-
 import numpy as np
 
 from edge.chips.ad7147 import (
@@ -17,53 +14,21 @@ from edge.chips.ad7147 import (
     STATUS,
     SYSTEM,
 )
-from edge.chips.chip import ChipSpec
-from edge.fake.bus import FakeChip, Sense
+from edge.fake.bus import FakeChip
 
 
 class FakeAD7147(FakeChip):
     """A model of the AD7147-1: the registers that the driver uses, and the results.
 
     A running stage serves its taxel where its own input is connected, else something
-    else. A stage that does not run serves 0.
+    else. A stage that does not run serves 0. Where timed, results are as old as the last
+    conversion. Power-up leaves the stage registers undefined.
     """
-
-    def __init__(
-        self,
-        sense: Sense,
-        *,
-        refresh_s: float = 0.0,
-        power_up: random.Random | None = None,
-    ) -> None:
-        """Model a chip.
-
-        Args:
-            sense: raw values of the 12 taxels at a time.
-            refresh_s: time of a conversion (see `REFRESH_S`): results are as old as the
-                last one; 0 for results that are always fresh.
-            power_up: draws the stage registers, which power-up leaves undefined.
-        """
-        self._refresh = refresh_s
-        self._power_up = power_up or random.Random("power-up")
-        super().__init__(sense)
-
-    @classmethod
-    def of(
-        cls,
-        spec: ChipSpec,
-        sense: Sense,
-        *,
-        timed: bool,
-        power_up: random.Random,
-    ) -> Self:
-        """The model of a skin's chip."""
-        refresh_s = REFRESH_S if timed else 0.0
-        return cls(sense, refresh_s=refresh_s, power_up=power_up)
 
     def reset(self) -> None:
         """Registers as after power-on."""
         self.registers = np.zeros(0x400, dtype=np.uint16)
-        undefined = [self._power_up.randrange(1 << 16) for _ in BANKS]
+        undefined = [self._draw.randrange(1 << 16) for _ in BANKS]
         self.registers[STAGE_BANK : STAGE_BANK + len(undefined)] = undefined
         self.registers[DEVICE_ID] = 0x1472
         self._pointer = 0
@@ -79,8 +44,8 @@ class FakeAD7147(FakeChip):
 
     def read(self, n: int, t: float) -> bytes:
         """Words from the pointer on."""
-        if self._refresh > 0.0:
-            t = t // self._refresh * self._refresh
+        if self._timed:
+            t = t // REFRESH_S * REFRESH_S
         banks = self.registers[STAGE_BANK : STAGE_BANK + len(BANKS)]
         connections = banks.reshape(STAGES, STAGE_REGISTERS)[:, :3]
         power = int(self.registers[SYSTEM])

@@ -26,13 +26,23 @@ Sense = Callable[[float], Counts]
 class FakeChip(ABC):
     """A model of a chip on a fake bus."""
 
-    def __init__(self, sense: Sense) -> None:
+    def __init__(
+        self,
+        sense: Sense,
+        *,
+        timed: bool = False,
+        power_up: random.Random | None = None,
+    ) -> None:
         """Model a chip that has just been powered on.
 
         Args:
             sense: raw values of its taxels at a time.
+            timed: whether conversions take their real time.
+            power_up: draws the registers that power-up leaves undefined.
         """
         self._sense = sense
+        self._timed = timed
+        self._draw = power_up or random.Random("power-up")
         self._pointer = 0
         self.reset()
 
@@ -45,15 +55,8 @@ class FakeChip(ABC):
         timed: bool,
         power_up: random.Random,
     ) -> Self:
-        """The model of a skin's chip.
-
-        Args:
-            spec: the chip.
-            sense: raw values of its taxels at a time.
-            timed: whether conversions take their real time.
-            power_up: draws the registers that power-up leaves undefined.
-        """
-        return cls(sense)
+        """The model of a skin's chip `spec`; for the others see `__init__`."""
+        return cls(sense, timed=timed, power_up=power_up)
 
     @abstractmethod
     def write(self, data: bytes, t: float) -> None:

@@ -11,7 +11,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from edge.arrays import Counts, Floats, Integers
-from edge.bus.protocol import Message
 from edge.chips import kinds
 from edge.chips.chip import MOST_TAXELS, UNUSED, ChipSpec
 from edge.errors import InputError
@@ -23,7 +22,6 @@ from edge.skin import file as skinfile
 from edge.skin.file import SkinFile, TaxelCalibration
 from edge.skin.skin import Skin
 from edge.skin.wiring import BusSpec
-from edge.touch.frame import Frame
 from edge.touch.layout import SkinLayout
 
 FRAMES = 100
@@ -61,7 +59,11 @@ class Playback:
         last = float(np.median(steps)) if steps.size else 0.01
         self._length = float(self._t[-1]) + last
         if loop:
-            self._frames.append(_untouched(self._frames[-1]))
+            last_frame = self._frames[-1]
+            counts = np.zeros_like(last_frame.counts)
+            shear = last_frame.shear
+            untouched = None if shear is None else np.zeros_like(shear)
+            self._frames.append(replace(last_frame, counts=counts, shear=untouched))
             self._t = np.append(self._t, self._length)
             self._length += PAUSES * recording.layout.release_s
         self.ends = math.inf if loop else self._length
@@ -87,12 +89,6 @@ class Playback:
     def at(self, t: float) -> Floats | None:
         """Joint angles (dof,) at `t`; None where the recording has none."""
         return self._frames[self._index(t)].joints
-
-
-def _untouched(frame: Frame) -> Frame:
-    """The frame without a touch."""
-    shear = None if frame.shear is None else np.zeros_like(frame.shear)
-    return replace(frame, counts=np.zeros_like(frame.counts), shear=shear)
 
 
 def calibrated(file: SkinFile, noise_counts: float = 0.0) -> SkinFile:
@@ -141,13 +137,18 @@ def fake_buses(
     assert calibration is not None
     buses = []
     for b, spec in enumerate(file.buses):
+        bits = wire_bits
+        if spec.serial:
+            from edge.bus.serial_bus import serial_bits  # few skins have a serial port
+
+            bits = serial_bits
         bus = make(
             spec.device,
             clock=clock,
             clock_hz=spec.clock_hz,
             timed=timed,
             timeout_s=file.reading.timeout_s,
-            count=_bits_counter(spec),
+            count=bits,
         )
         shape = NOISE_FRAMES if noise_counts else 1, calibration.baseline.size
         with delayed():  # numpy imports its generators at their first use
@@ -166,15 +167,6 @@ def fake_buses(
             chips[chip.address] = model
         buses.append(bus)
     return buses
-
-
-def _bits_counter(spec: BusSpec) -> Callable[[Sequence[Message]], int]:
-    """The function that counts the bits of a call on a bus."""
-    if not spec.serial:
-        return wire_bits
-    from edge.bus.serial_bus import serial_bits  # few skins have a serial port
-
-    return serial_bits
 
 
 def _sense(
@@ -295,9 +287,7 @@ def play_file(
     return play(file, recording, loop=loop, clock=clock, noise_counts=noise_counts)
 
 
-def frame_bits(
-    file: SkinFile, frames: int = FRAMES, overhead_s: float = 0.0
-) -> list[float]:
+def frame_bits(file: SkinFile, overhead_s: float = 0.0) -> list[float]:
     """Bits on the wire of each bus for a frame, as a mean over some, counted while the
     drivers send them.
 
@@ -311,10 +301,10 @@ def frame_bits(
         ]
         for bus in buses:
             bus.bits = bus.transactions = 0
-        for _ in range(frames):
+        for _ in range(FRAMES):
             skin.read()
         return [
-            (bus.bits + bus.transactions * overhead_s * bus.clock_hz) / frames
+            (bus.bits + bus.transactions * overhead_s * bus.clock_hz) / FRAMES
             for bus in buses
         ]
 
@@ -322,7 +312,7 @@ def frame_bits(
 def frame_rate(file: SkinFile, overhead_s: float = 0.0) -> float:
     """Frames a second that the skin's buses carry side by side, with the software's time
     of each transaction."""
-    bits = frame_bits(file, overhead_s=overhead_s)
+    bits = frame_bits(file, overhead_s)
     clocks = [bus.clock_hz for bus in file.buses]
     return 1.0 / max(count / hz for count, hz in zip(bits, clocks, strict=True))
 

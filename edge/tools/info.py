@@ -17,6 +17,11 @@ from edge.model.metadata import to_json
 from edge.model.model import Model
 from edge.model.onnx_file import DIGITS
 
+MEASURED = (
+    "Of touches of each {} that it has not met, {unknown:.0%} are called unknown, "
+    "{unsure:.0%} are named with a confidence below 50 %, {sure:.0%} with more than "
+    "90 %; of those that it knows {known:.0%} are called unknown."
+)
 UNMEASURED = (
     "How it answers for an unseen {} is not known: too few were in training for one to "
     "be held out."
@@ -85,15 +90,8 @@ def doubt(stopping: Mapping[str, Stopping]) -> Iterator[str]:
     for task, of_task in stopping.items():
         if of_task.remoteness is not None:
             worth = of_task.remoteness.worth
-            yield _worth(task, **worth) if worth else UNMEASURED.format(task)
-
-
-def _worth(task: str, unknown: float, unsure: float, sure: float, known: float) -> str:
-    return (
-        f"Of touches of each {task} that it has not met, {unknown:.0%} are called "
-        f"unknown, {unsure:.0%} are named with a confidence below 50 %, {sure:.0%} with "
-        f"more than 90 %; of those that it knows {known:.0%} are called unknown."
-    )
+            sentence = MEASURED if worth else UNMEASURED
+            yield sentence.format(task, **worth)
 
 
 def _origin(info: ModelInfo) -> list[str]:

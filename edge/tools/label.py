@@ -74,30 +74,21 @@ def run(arguments: argparse.Namespace) -> int:
     if arguments.undo:
         return undo(arguments.data, output)
     paths = find(arguments.data)
-    changes = arguments.accept or arguments.set or arguments.unset or arguments.delete
+    changes = any((arguments.accept, arguments.set, arguments.unset, arguments.delete))
     # Nobody else changes what is changed here, from its reading on.
-    with alone({path.parent for path in paths} if changes else ()):
-        recordings = _chosen(output, paths, arguments.only)
+    with alone(path.parent for path in paths if changes):
+        recordings = []
+        for path in paths:
+            recording = load(path)
+            if review.selected(recording.meta, arguments.only):
+                recordings.append((path, recording))
         if not recordings:
+            output.text(f"none of {counted(len(paths), 'recording')} is of this kind")
             return 1
         if changes:
             return _change(arguments, output, recordings)
         _print(output, recordings)
         return 0
-
-
-def _chosen(
-    output: Output, paths: Sequence[Path], kinds: Sequence[str]
-) -> list[tuple[Path, Recording]]:
-    """The recordings that are of all kinds, with a message if there are none."""
-    recordings = []
-    for path in paths:
-        recording = load(path)
-        if review.selected(recording.meta, kinds):
-            recordings.append((path, recording))
-    if not recordings:
-        output.text(f"none of {counted(len(paths), 'recording')} is of this kind")
-    return recordings
 
 
 def _change(

@@ -256,17 +256,24 @@ class Page:
         """Label or delete trials, so that it can be taken back.
 
         Raises:
-            InputError: the page does not show all of them, or one cannot be read or
-                written.
+            InputError: the page does not show all of them, one cannot be read or
+                written, or the labels are no names.
         """
         files = action.get("files") or [None]
         if not set(self._trials).issuperset(files):
             raise InputError(f"{files} are none of the trials that this page shows")
         with alone([folder]):
-            changes = _changes([folder / name for name in files], action)
+            paths = [folder / name for name in files]
+            changes: dict[Path, dict[str, str] | None] = dict.fromkeys(paths)
+            if action["do"] != "delete":
+                accepts = action["do"] == "accept"
+                labels = {} if accepts else _labels(action)
+                for path in paths:
+                    meta = load(path).meta
+                    changes[path] = changed(str(path), meta, labels, accepts=accepts)
             change_all(changes)
-            for path, labels in changes.items():
-                if labels is None:
+            for path, after in changes.items():
+                if after is None:
                     del self._trials[path.name]
                 else:
                     self._show_trial(path)
@@ -288,22 +295,6 @@ def _decision(event: Decided) -> Json:
     distances = [] if decision is None else decision.distances.round(3).tolist()
     neighbours = list(zip(event.nearest, distances, strict=True))
     return {**event.to_dict(), "neighbours": neighbours}
-
-
-def _changes(paths: Sequence[Path], action: Json) -> dict[Path, dict[str, str] | None]:
-    """The labels that an action gives to trials; None where it deletes them.
-
-    Raises:
-        InputError: one cannot be read, or the labels are no names.
-    """
-    if action["do"] == "delete":
-        return dict.fromkeys(paths)
-    accepts = action["do"] == "accept"
-    labels = {} if accepts else _labels(action)
-    return {
-        path: changed(str(path), load(path).meta, labels, accepts=accepts)
-        for path in paths
-    }
 
 
 def _labels(action: Json) -> dict[str, str]:

@@ -78,7 +78,7 @@ def test_ones_up_to_the_end_are_a_bus_that_nobody_drives_and_ones_before_it_a_va
 
 def test_model_converts_in_its_own_time():
     model = FakeAD7147(
-        lambda t: np.full(12, round(t * 1e6), dtype=np.uint16), refresh_s=0.009216
+        lambda t: np.full(12, round(t * 1e6), dtype=np.uint16), timed=True
     )
     bus = FakeBus(chips={0x2C: model})
     chip = AD7147(bus, 0x2C)

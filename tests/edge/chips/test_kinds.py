@@ -77,10 +77,6 @@ class Toy(Chip):
 
 
 class FakeToy(FakeChip):
-    def __init__(self, sense):
-        self.sense = sense
-        self.reset()
-
     def reset(self):
         self.pointer = 0
 
@@ -90,7 +86,7 @@ class FakeToy(FakeChip):
     def read(self, n, t):
         if self.pointer == 0:
             return b"\x70"
-        return self.sense(t).astype(np.uint8).tobytes()
+        return self._sense(t).astype(np.uint8).tobytes()
 
 
 TOY_SKIN = """[skin]

@@ -47,8 +47,7 @@ def test_the_wires_carry_these_frame_rates_at_400_khz(kind, buses, hz):
 
 
 def test_all_checks_together_cost_at_most_4_percent_of_the_wire():
-    frames = 160
-    assert sum(frame_bits(CODY, frames)) <= 1.04 * 8320
+    assert sum(frame_bits(CODY)) <= 1.04 * 8320
 
 
 @pytest.mark.parametrize("file", [CODY, PAD], ids=["cody", "mpr121"])
