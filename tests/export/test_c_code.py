@@ -188,6 +188,7 @@ def early(tmp_path_factory):
     return model, [*touches, *on_the_edges(model.info.layout)]
 
 
+@pytest.mark.slow
 @needs_gcc
 def test_the_demo_has_the_same_bits(tmp_path):
     model = Model(demo.MODEL)
@@ -449,6 +450,7 @@ def test_the_baseline_follows_as_pythons(tmp_path):
     assert np.unique(answer).size > 10
 
 
+@pytest.mark.slow
 @needs_gcc
 def test_a_frame_that_cannot_be_taken_in_is_an_error(tmp_path):
     c_code.export(Model(demo.MODEL), tmp_path)

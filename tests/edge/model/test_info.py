@@ -103,7 +103,7 @@ def test_a_refusal_asks_for_more_trials_than_there_were():
 
 
 def test_where_the_full_window_errs_more_often_trials_do_not_help():
-    assert "more trials alone will not do" in refusal(stopping(wrong=28), 0.15)
+    assert "more trials alone will not do" in refusal(stopping(wrong=21), 0.15)
     assert "needs about" in refusal(stopping(wrong=0), 0.01)
 
 
