@@ -292,6 +292,20 @@ def test_a_microcontroller_has_the_same_bits(early, tmp_path, board):
     assert_same(model, tmp_path, touches[::3], vectors, error, board)
 
 
+def hostile_blends(X, count, rng):
+    """Vectors of every kind: trained ones, blends of two and what lies beyond them, an
+    ulp beside these, and some with a number that is huge, tiny, infinite or none."""
+    first, second = X[rng.integers(0, len(X), (2, count))]
+    weights = rng.choice([0.0, 0.5, 1.0, 1.5, -1e4, 1e30], (count, 1))
+    vectors = first + weights * (second - first)
+    beside = np.nextafter(vectors, rng.choice([-np.inf, np.inf], vectors.shape))
+    vectors = np.where(rng.random((count, 1)) < 0.3, beside, vectors)
+    odd = rng.choice([np.nan, np.inf, -np.inf, 1e308, -1e308, 5e-324, -0.0], count)
+    rows = np.flatnonzero(rng.random(count) < 0.2)
+    vectors[rows, rng.integers(0, X.shape[1], len(rows))] = odd[rows]
+    return vectors
+
+
 @pytest.mark.slow
 @needs_gcc
 @pytest.mark.parametrize("seed", range(10))
@@ -312,7 +326,7 @@ def test_a_random_models_graph_has_the_same_bits_of_hostile_vectors(tmp_path, se
     fitted = fit(X, choices, labels, lack=list(choices)[1:2])
     path = tmp_path / "model.onnx"
     path.write_bytes(to_onnx(fitted, describe(fitted, samples=8)))
-    vectors = [*queries, *np.nextafter(queries, np.inf), *hostile(24, rng)]
+    vectors = [*queries, *hostile(24, rng), *hostile_blends(X, 500, rng)]
     assert_same(Model(path), tmp_path / "c", [], vectors)
 
 

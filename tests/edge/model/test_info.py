@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from edge.config import ConfigTable
-from edge.early import fastest, is_fixed, is_sure, refusal, stopping_rules
+from edge.early import fastest, is_fixed, refusal, stopping_rules
 from edge.errors import InputError
 from edge.model.info import (
     Remoteness,
@@ -57,15 +57,6 @@ def test_the_fastest_rule_that_is_certified_is_taken():
         0.8,
         0.4,
     ]
-
-
-@pytest.mark.parametrize("excess", [0.0, 0.7])
-def test_a_novel_contact_needs_a_larger_margin_at_every_decision_point(excess):
-    _, at_nine_tenths, _ = stopping().rules
-    evidence = 2.0 * (math.log(9.0) + excess)
-    for more, sure in ((1e-9, True), (-1e-9, False)):
-        distances = [0.0, evidence + more]
-        assert is_sure(stopping(), at_nine_tenths, distances, 0, excess) is sure
 
 
 @pytest.mark.parametrize(
