@@ -54,16 +54,3 @@ def test_the_sum_of_all_that_was_cut_off_is_given(graph, x, inside, off):
     clipped, rest = build.clipped("x", [4.0])
     np.testing.assert_array_equal(run(clipped, np.array([x])), [inside])
     np.testing.assert_array_equal(run(rest, np.array([x])), [[off]])
-
-
-def test_constants_are_stored_in_the_smallest_type_that_holds_all_of_them(graph):
-    build, _ = graph
-    build.decision_point = build.constant(1)
-    kinds = {
-        TensorProto.INT16: -(2.0**15),
-        TensorProto.FLOAT: 2.0**24,
-        TensorProto.DOUBLE: 2.0**24 + 1.0,
-    }
-    for kind, value in kinds.items():
-        build.by_decision_point_small([np.array([1.0]), np.array([value])])
-        assert list(build.constants.values())[-1].data_type == kind

@@ -206,20 +206,3 @@ def test_tasks_of_one_space_share_its_projection_but_not_their_rows(export):
     assert matrices == weights | rows | ballots
     (opset,) = proto.opset_import
     assert opset.domain == ""
-
-
-@pytest.mark.parametrize("k", [1, 2, 3])
-def test_vectors_that_are_not_finite_have_no_label_and_spoil_no_other(export, k):
-    X = features(60)
-    _, model = export(X, {"t": Choice("IV", 5, k)})
-    queries = X[:8].copy()
-    queries[1, 0] = np.nan
-    queries[2, 119] = np.inf
-    queries[3, 60] = -np.inf
-    queries[4] = 1e305  # infinite once scaled
-    answer = model.run(queries)
-    spoilt = [1, 2, 3, 4]
-    sound = [0, 5, 6, 7]
-    assert (answer["t_label"][spoilt] == -1).all()
-    assert not answer["t_scores"][spoilt].any()
-    assert (answer["t_label"][sound] == model.run(X[sound])["t_label"]).all()

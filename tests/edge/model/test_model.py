@@ -120,19 +120,6 @@ def another_input(proto):
     )
 
 
-def twice_as_many_neighbours(proto):
-    """It is known only after a sum."""
-    index, top = next(
-        (i, n)
-        for i, n in enumerate(proto.graph.node)
-        if "object_neighbours" in n.output
-    )
-    proto.graph.node.insert(
-        index, helper.make_node("Add", [top.input[1]] * 2, ["twice"])
-    )
-    proto.graph.node[index + 1].input[1] = "twice"
-
-
 def edited(edit):
     """The change of a model that edits its metadata."""
 
@@ -157,7 +144,6 @@ REFUSED = {
     no_metadata: "no edge-classify metadata",
     another_attribute: "ONNX Runtime refuses it",
     another_input: "has an input more",
-    twice_as_many_neighbours: "no tensor(double) object_distances of shape [3]",
     edited(dict.clear): "its metadata: not JSON",
     meta(samples=30): "no tensor(double) features of shape [90], which its metadata",
     meta(

@@ -72,12 +72,6 @@ def test_a_trial_without_a_label_is_no_rival():
     assert by_hand(BY_HAND._replace(labels=np.array([0, -1]))).rival is None
 
 
-def why_of(info, space, vector, rows, label):
-    """The explanation of a decision, and the distances of the trials that voted."""
-    why = explain(space, vector, rows.tolist(), label, info.features, info.widths)
-    return why, [near.distance for near in why.voters]
-
-
 def test_a_task_is_explained_by_its_own_columns_and_trials_at_the_full_window(
     model, tmp_path
 ):
@@ -102,8 +96,9 @@ def test_a_task_is_explained_by_its_own_columns_and_trials_at_the_full_window(
         for vector in vectors:
             decision = model.decide(vector)[name]
             answer = task.labels.index(decision.label)
-            rows = decision.neighbours
-            why, distances = why_of(model.info, space, vector, rows, answer)
+            rows = decision.neighbours.tolist()
+            why = explain(space, vector, rows, answer, info.features, info.widths)
+            distances = [near.distance for near in why.voters]
             assert distances == pytest.approx(decision.distances.tolist(), abs=1e-5)
             assert why.rival.label != answer
             for near in (*why.voters, why.rival):

@@ -269,26 +269,16 @@ def test_a_feature_that_was_not_measured_is_one_sentence():
         feature_vector(series, 1.0, 2, ["stiffness"])
 
 
-@settings(max_examples=40)
-@given(
-    seed=st.integers(0, 1 << 32),
-    shape=st.sampled_from([(3, 5), (17, 31), (1, 700)]),
-)
-def test_a_cell_is_the_sum_of_its_readable_taxels_and_dead_cells_are_left_out(
-    seed, shape
-):
-    rng = np.random.default_rng(seed)
+@pytest.mark.parametrize("shape", [(3, 5), (17, 31), (1, 700)])
+def test_a_cell_is_the_sum_of_its_readable_taxels_and_dead_cells_are_left_out(shape):
     rows, cols = shape
-    dead = rng.choice(
-        rows * cols,
-        size=rng.integers(0, rows * cols // 2),
-        replace=False,
-    )
+    rng = np.random.default_rng(cols)
+    dead = rng.permutation(rows * cols)[: rows * cols // 2]
     layout = SkinLayout(rows, cols, dead=tuple(sorted(dead.tolist())))
     counts = rng.integers(0, 65536, shape).astype(np.uint16)
-    valid = None if seed % 4 == 0 else rng.random(shape) < 0.8
+    valid = rng.random(shape) < 0.8
     cells = Cells(layout)
-    readable = counts.astype(int) * (1 if valid is None else valid)
+    readable = counts.astype(int) * valid
     squares = [
         np.s_[row : row + cells.side, col : col + cells.side]
         for row in range(0, rows, cells.side)
