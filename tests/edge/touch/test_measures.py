@@ -96,10 +96,10 @@ def test_the_largest_skin_full_of_the_largest_counts_does_not_overflow(wraps):
     sums = (side * side, row, row, squares, line * line, squares)
     zones = zones_of(layout, frame, ["skin_length"])
     assert zones["skin"][2:] == [65535 * v for v in sums]
-    features = ["skin_spread_along", "skin_slant"]
-    vector = vector_of(layout, [frame, replace(frame, t=1.0)], features, 2)
-    assert vector[0] == pytest.approx(np.sqrt((side**2 - 1) / 12), rel=1e-15)
-    assert vector[2] == 0.0
+    values = quantities(np.array([zones["skin"]]), layout)
+    spread = np.sqrt((side**2 - 1) / 12)
+    assert values["spread_along"] == pytest.approx(spread, rel=1e-15)
+    assert values["slant"] == 0.0
 
 
 def series_of(layout: SkinLayout, frames, features):
