@@ -427,6 +427,7 @@ def test_the_sketch_suits_the_header(tmp_path, monkeypatch):
     assert compiled.returncode == 0, compiled.stderr
 
 
+@pytest.mark.slow
 @needs_gcc
 def test_the_baseline_follows_as_pythons(tmp_path):
     rng = np.random.default_rng(9)

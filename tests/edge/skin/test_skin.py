@@ -11,7 +11,7 @@ from edge.chips import ad7147
 from edge.chips.block import UNCHANGED_FRAMES
 from edge.errors import EdgeError, InputError
 from edge.fake.clock import VirtualClock
-from edge.fake.player import calibrated, fake_skin, frame_bits, still
+from edge.fake.player import calibrated, fake_skin, still
 from edge.skin import file as skinfile
 from edge.skin.file import Reading
 from edge.skin.loop import Loop
@@ -33,11 +33,6 @@ def on_one_bus():
         chips.append(replace(chip, channel=channel, address=address))
     reading = Reading(verify_mux=False, recheck_frames=100_000)
     return replace(CODY, buses=(BusSpec("bus 0", tuple(chips)),), reading=reading)
-
-
-def test_all_checks_together_cost_at_most_4_percent_of_the_wire():
-    frames = 160
-    assert sum(frame_bits(CODY, frames)) <= 1.04 * 8320
 
 
 @pytest.mark.parametrize("file", [CODY, PAD], ids=["cody", "mpr121"])
