@@ -103,6 +103,19 @@ def by_hand(fitted, rows, points, k):
     return answers
 
 
+def same_of_all_engines(data, outputs, queries):
+    """The outputs of a model file, which are the same bits in each engine."""
+    numpy_graph = Graph(onnx_file.read(data, "the graph"))
+    ours, *others = (
+        engine.run(outputs, {"features": queries})
+        for engine in (session(data), ReferenceEvaluator(data), numpy_graph)
+    )
+    for name, values, *of_others in zip(outputs, ours, *others, strict=True):
+        for of_another in of_others:
+            assert values.tobytes() == of_another.tobytes(), name
+    return ours
+
+
 def coordinates_of(graph):
     """The name of the coordinates, which become an output; the last Clip gives them."""
     *_, last = (node for node in graph.node if node.op_type == "Clip")
@@ -142,20 +155,12 @@ def test_every_number_of_the_graph_is_that_of_whole_numbers(
     expected = by_hand(fitted, rows, points, k)
     assert (task_fit.rows / p.grid_.unit).tolist() == rows.tolist()
     outputs = [z_name, *(f"t_{name}" for name in expected), "out_of_range"]
-    data = sealed(proto)
-    numpy_graph = Graph(onnx_file.read(data, "the graph"))
-    ours, *others = (
-        engine.run(outputs, {"features": queries})
-        for engine in (session(data), ReferenceEvaluator(data), numpy_graph)
-    )
+    ours = same_of_all_engines(sealed(proto), outputs, queries)
     z, *answers, cut = ours
     assert cut.tolist() == exact.projected(queries, p).cut.tolist()
     assert z[:, :c].tolist() == points.tolist()
     for (name, values), numbers in zip(expected.items(), answers, strict=True):
         assert numbers.tolist() == values, name
-    for name, values, *of_others in zip(outputs, ours, *others, strict=True):
-        for of_another in of_others:
-            assert values.tobytes() == of_another.tobytes(), name
 
 
 def test_an_ulp_more_in_every_feature_changes_no_bit(export):
