@@ -155,8 +155,7 @@ def test_every_number_of_the_graph_is_that_of_whole_numbers(
     expected = by_hand(fitted, rows, points, k)
     assert (task_fit.rows / p.grid_.unit).tolist() == rows.tolist()
     outputs = [z_name, *(f"t_{name}" for name in expected), "out_of_range"]
-    ours = same_of_all_engines(sealed(proto), outputs, queries)
-    z, *answers, cut = ours
+    z, *answers, cut = same_of_all_engines(sealed(proto), outputs, queries)
     assert cut.tolist() == exact.projected(queries, p).cut.tolist()
     assert z[:, :c].tolist() == points.tolist()
     for (name, values), numbers in zip(expected.items(), answers, strict=True):

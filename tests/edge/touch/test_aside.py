@@ -28,7 +28,6 @@ BROKEN = {
     "noise of 45 about 0": 45 * NOISE,
     "flickers in 20 %": 500 * (CHANCE < 0.2),
     "wanders by 20": 1000 + (20 * NOISE).cumsum(axis=1),
-    "swells by 300 a second": 300 * T + 0 * NOISE,
     "swells by 50 a second": 50 * T + 0 * NOISE,
 }
 
