@@ -112,16 +112,9 @@ def test_each_contact_gets_its_own_decisions_even_where_their_windows_overlap(
     assert onsets == pytest.approx([0.2, 0.2, 1.3, 1.3])
 
 
-def test_another_skin_and_missing_joints_are_refused(model, make_touch, forearm):
+def test_another_skin_is_refused(model, forearm):
     with pytest.raises(InputError, match="16 x 23"):
         Classifier(model, replace(forearm, cols=23))
-    with pytest.raises(InputError, match="here: has no joint angles"):
-        model.require_joints(None, "here")
-    with pytest.raises(
-        InputError, match="here: has 3 joint angles, but the model needs 5"
-    ):
-        model.require_joints(3, "here")
-    model.require_joints(5, "here")
 
 
 def test_a_stuck_taxel_is_named_and_hides_no_touch(model, make_touch):

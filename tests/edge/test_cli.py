@@ -53,7 +53,6 @@ def test_without_a_command_the_commands_are_listed(capsys):
     ("typed", "sentence"),
     [
         ("reply", "there is no command 'reply'; did you mean 'replay'?"),
-        ("calibrat", "did you mean 'calibrate'?"),
         ("dance!", "the commands are check, scan,"),
     ],
 )

@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from edge.early import Product, is_sure, refusal
+from edge.early import Product, Uncertified, is_sure
 from edge.events import Decided
 from edge.model.info import Stopping, StoppingRule, Task
 from edge.model.model import Decision
@@ -25,31 +25,41 @@ CANDIDATE = Decided("category", "x-a", 0.2, 0.6, 0.0, 1.0, ("tie",), decision=OW
 
 
 def test_a_label_is_sure_from_the_rules_confidence_on_and_less_so_in_doubt():
-    stopping = Stopping((), (), (), 1.0, 0.0, 1.0, (), 20, 0, 0.1)
+    stopping = Stopping((), (), (), 0.5, 0.0, 1.0, (), 20, 0, 0.1)
     rule = StoppingRule(0.1, 1.0, 0.5, 2)
-    assert is_sure(stopping, rule, [0.0, 2.0], 0, 2.0)
-    assert not is_sure(stopping, rule, [0.0, 2.0], 0, 2.01)
+    assert is_sure(stopping, rule, [0.0, 4.0], 0, 2.0)
+    assert not is_sure(stopping, rule, [0.0, 4.0], 0, 2.01)
 
 
 SURE = StoppingRule(0.1, 0.6, 0.7, 2)
 FIXED = StoppingRule(0.1, 0.6, 2.0, 1)
 
 
-def test_more_trials_do_not_certify_an_error_that_is_made():
-    stopping = Stopping((), (), (), 1.0, 0.0, 1.0, (SURE,), 20, 2, 0.1)
-    assert "more trials alone will not do" in refusal(stopping, 0.1)
-    assert "0.11 needs about" in refusal(stopping, 0.11)
-
-
-def answered(first, second, stops=("confidence",) * 2, rule=SURE):
-    """The product's answer once its factors have these, with 0.9 and 0.8."""
-    info = SimpleNamespace(tasks=TASKS, stopping={"category": None})
-    policy = Product(info, "category", rule, 0.1)
+def factors(first, second, stops):
+    """The answers to the factors, with 0.9 and 0.8."""
     decided = {}
     pairs = zip(("first", "second"), (first, second), (0.9, 0.8), stops, strict=True)
     for name, label, confidence, stop in pairs:
         decided[name] = Decided(name, label, confidence, 0.6, 0.0, 1.0, stopped_by=stop)
-    return policy.answer(CANDIDATE, 1, decided)
+    return decided
+
+
+def answered(first, second, stops=("confidence",) * 2, rule=SURE):
+    """The product's answer once its factors have these."""
+    info = SimpleNamespace(tasks=TASKS, stopping={"category": None})
+    policy = Product(info, "category", rule, 0.1)
+    return policy.answer(CANDIDATE, 1, factors(first, second, stops))
+
+
+def test_a_product_that_is_not_certified_has_its_factors_labels_at_the_last_point():
+    info = SimpleNamespace(
+        tasks=TASKS, products={"category"}, decision_points_s=(0.6, 1.2)
+    )
+    decided = factors("y", "b", ("window", "window"))
+    assert Uncertified(info).answer(CANDIDATE, 0, decided) is None
+    answer = Uncertified(info).answer(CANDIDATE, 1, decided)
+    assert answer.label == answer.decision.label == "y-b"
+    assert "uncertified" in answer.flags
 
 
 def test_a_product_has_its_factors_labels_and_the_product_of_their_confidences():

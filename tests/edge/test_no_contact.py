@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from edge.classifier import Classifier
-from edge.events import Decided
 from edge.model.model import Model
+from tests.edge.test_classifier import decided
 
 
 @pytest.fixture
@@ -59,10 +59,9 @@ def test_a_touch_too_weak_to_be_a_contact_is_flagged(model, still):
 
 
 def test_a_contact_is_decided_as_ever(model, make_touch):
-    events = Classifier(model).classify(make_touch())
-    decided = [event for event in events if isinstance(event, Decided)]
-    assert [event.task for event in decided] == ["category", "object"]
-    assert all(event.label != "none" for event in decided)
+    events = decided(model, make_touch())
+    assert [event.task for event in events] == ["category", "object"]
+    assert all(event.label != "none" for event in events)
 
 
 def test_no_frame_at_all_says_nothing(model):

@@ -61,6 +61,7 @@ STEPS = [
 ]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "actions", [[relabel], [delete], [relabel, undo], [delete, undo]]
 )

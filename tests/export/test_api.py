@@ -14,7 +14,6 @@ from edge.model.verify import verify
 from edge.recording import load
 from edge.saving import save
 from export import api
-from train.model.pipeline import ContactClassifier
 from train.report.summary import names, warnings
 
 
@@ -74,24 +73,6 @@ def test_trials_of_one_recording_are_numbered_and_too_many_names_are_left_out(
     info = Model(tmp_path / "model.onnx").info
     assert info.trials == ()
     assert info.trial(3) == "trial 3"
-
-
-def test_tasks_of_different_features_share_one_vector(recordings, tmp_path):
-    fitted = train.fit(str(recordings), features=["paper", "contact"], jobs=1, k=1)
-    choices = {task: chosen.choice for task, chosen in fitted.chosen.items()}
-    choices["category"] = replace(choices["category"], features=("log_max_force@5",))
-    names = fitted.dataset.names
-    widths = fitted.dataset.widths(fitted.samples)
-    classifier = ContactClassifier(choices, names, widths)
-    y = {task: fitted.dataset.labels(task) for task in choices}
-    classifier.fit(fitted.X, y)
-    path = tmp_path / "model.onnx"
-    export.save(path, replace(fitted, classifier=classifier, sequential=None))
-    queries = 1.01 * fitted.X
-    answers = Model(path).run(queries)
-    for task in choices:
-        _, rows = classifier.tasks_[task].neighbours(queries)
-        assert (answers[f"{task}_neighbours"] == rows).all()
 
 
 def test_recordings_of_no_contact_are_decided_as_such(recordings, make_touch, tmp_path):

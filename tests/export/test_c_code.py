@@ -188,6 +188,7 @@ def early(tmp_path_factory):
     return model, [*touches, *on_the_edges(model.info.layout)]
 
 
+@pytest.mark.slow
 @needs_gcc
 def test_the_demo_has_the_same_bits(tmp_path):
     model = Model(demo.MODEL)
@@ -426,6 +427,7 @@ def test_the_sketch_suits_the_header(tmp_path, monkeypatch):
     assert compiled.returncode == 0, compiled.stderr
 
 
+@pytest.mark.slow
 @needs_gcc
 def test_the_baseline_follows_as_pythons(tmp_path):
     rng = np.random.default_rng(9)
@@ -449,6 +451,7 @@ def test_the_baseline_follows_as_pythons(tmp_path):
     assert np.unique(answer).size > 10
 
 
+@pytest.mark.slow
 @needs_gcc
 def test_a_frame_that_cannot_be_taken_in_is_an_error(tmp_path):
     c_code.export(Model(demo.MODEL), tmp_path)

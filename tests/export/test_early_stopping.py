@@ -11,10 +11,9 @@ from onnxruntime import GraphOptimizationLevel
 
 import train
 from edge.classifier import Classifier
-from edge.early import fastest, policies, stopping_rules
+from edge.early import fastest, stopping_rules
 from edge.errors import InputError, OutOfRange
 from edge.events import Decided
-from edge.model.info import StoppingRule
 from edge.model.model import Model
 from edge.model.verify import first_series, verify
 from edge.saving import save
@@ -339,24 +338,6 @@ def test_no_decision_contradicts_another(agreeing, make_touch, rate):
         assert category.label == "-".join(factor.label for factor in factors)
         assert category.decision.label == category.label
         assert category.window_s == max(factor.window_s for factor in factors)
-
-
-@pytest.mark.parametrize("certified", [0.2, 0.5])
-def test_a_category_has_the_labels_that_were_decided_before_it(
-    agreeing, make_touch, monkeypatch, certified
-):
-    """Whether it is certified for the error rate or not."""
-    _, model = agreeing
-    for task, error in (("softness", 0.1), ("mobility", 0.1), ("category", certified)):
-        rule = StoppingRule(error, 1.2, 2.0, 2)
-        waiting = replace(model.info.stopping[task], rules=(rule,))
-        monkeypatch.setitem(model.info.stopping, task, waiting)
-    events = decided(model, next(pressed(make_touch, [50])), None)
-    assert events["category"].label == "hard-by 4"
-    before = {**events, "mobility": replace(events["mobility"], label="by 5")}
-    answer = policies(model, 0.3)["category"].answer(events["category"], 2, before)
-    assert answer.label == answer.decision.label == "hard-by 5"
-    assert ("uncertified" in answer.flags) == (certified == 0.5)
 
 
 def test_the_board_decides_as_the_trials_that_certified_its_rules_were(

@@ -53,5 +53,6 @@ def test_the_vectors_are_trials_training_rows_mixtures_and_two_that_are_not_fini
     assert not finite[-2:].any()
     for task in ("category", "object"):
         assert ((golden[f"{task}_label"] == -1) == ~finite).all()
+        assert not golden[f"{task}_scores"][~finite].any()
     assert (golden["object_distances"][: trials + 16, 0] == 0.0).all()
     assert golden["frames"].dtype == np.uint16

@@ -19,9 +19,7 @@ from edge.fake.bus import wire_bits
         ([write(0x2C, [0, 0x0B]), read(0x2C, 24)], 255),  # AD7147, 12 results
         ([write(0x5A, [0x04]), read(0x5A, 24)], 246),  # MPR121, 12 electrodes
         ([write(0x70, [1])], 20),  # TCA9548A, a channel
-        ([read(0x70, 1)], 20),
         ([write(0x28, [0]), read(0x28, 768)], 6942),  # 57.6 frames a second at 400 kHz
-        ([write(0x28, [0]), read(0x28, 384)], 3486),  # 114.7
     ],
 )
 def test_bits_on_the_wire_are_those_of_the_data_sheets(messages, bits):

@@ -1,13 +1,10 @@
 """The list of chips: a further chip is one entry. The defaults that a skin file need
 not give."""
 
-import sys
 from typing import ClassVar
 
-import numpy as np
 import pytest
 
-from edge.bus.protocol import fetch
 from edge.chips import kinds
 from edge.chips.chip import Chip, Defaults, Option, Traits
 from edge.chips.kinds import KINDS, Kind
@@ -15,7 +12,7 @@ from edge.errors import InputError
 from edge.fake.bus import FakeChip
 from edge.skin import file as skinfile
 from edge.skin.file import Signal, parse
-from tests.edge.skin.small import mpr121
+from tests.edge.skin.small import mpr121, one_chip
 
 
 def test_an_mpr121_works_without_a_single_setting():
@@ -49,69 +46,28 @@ def test_chips_of_two_kinds_have_each_its_own_sign_and_only_defaults_that_hold_f
 
 
 class Toy(Chip):
-    """A chip of four taxels of 8 bits behind the pointer 0x10, with an identity at
-    0x00."""
+    """A chip of four taxels."""
 
     name = "toy"
     stages = 4
     options: ClassVar = {"speed": Option(1, (1, 2))}
 
-    frame_pointer = b"\x10"
-
-    def __init__(self, bus, address, *, into):
-        super().__init__(bus, address, into=into)
-        if fetch(bus, address, b"\x00", 1) != b"\x70":
-            raise self.wrong("not a toy")
-
     @staticmethod
     def traits(taxels, options):
-        defaults = Defaults(threshold_counts=10 * options["speed"], onset_counts=30)
-        return Traits(4, highest=200, rest=20, defaults=defaults)
-
-    @staticmethod
-    def parse(data, spec):
-        return data.astype(np.uint16), data > 0
-
-    def healthy(self):
-        return fetch(self.bus, self.address, b"\x00", 1) == b"\x70"
+        return Traits(4, highest=200, rest=20, defaults=Defaults())
 
 
-class FakeToy(FakeChip):
-    def reset(self):
-        self.pointer = 0
-
-    def write(self, data, t):
-        self.pointer = data[0]
-
-    def read(self, n, t):
-        if self.pointer == 0:
-            return b"\x70"
-        return self._sense(t).astype(np.uint8).tobytes()
+def toy_skin(speed):
+    return one_chip(2, 2, "toy", bus=f"device = 1\nspeed = {speed}")
 
 
-TOY_SKIN = """[skin]
-rows = 2
-cols = 4
-[[bus]]
-device = 1
-kind = "toy"
-speed = 2
-block = [2, 2]
-chips = [{ address = 0x30, first = [0, 0] }, { address = 0x31, first = [0, 2] }]
-"""
-
-
-@pytest.fixture
-def toy(monkeypatch):
-    """The toy among the kinds of chips."""
-    kind = Kind(f"{__name__}.Toy", f"{__name__}.FakeToy")
-    monkeypatch.setitem(KINDS, "toy", kind)
-    monkeypatch.setitem(sys.modules, __name__, sys.modules[Toy.__module__])
-
-
-def test_an_option_belongs_to_its_kind(toy):
+def test_a_further_kind_is_an_entry_and_an_option_belongs_to_its_kind(monkeypatch):
+    monkeypatch.setitem(KINDS, "toy", Kind(f"{__name__}.Toy", ""))
+    (chip,) = parse(toy_skin(2)).chips
+    assert chip.kind.name == "toy"
+    assert chip.option("speed") == 2
     with pytest.raises(InputError, match="speed must be one of 1, 2, not 3"):
-        parse(TOY_SKIN.replace("speed = 2", "speed = 3"))
+        parse(toy_skin(3))
     with pytest.raises(InputError, match="bus 0 chip 0: unknown key speed"):
         parse(mpr121().replace("first", "speed = 1, first"))
 

@@ -106,6 +106,7 @@ def test_a_model_that_cannot_be_placed_leaves_no_golden_file(edge, new, tmp_path
 STEPS = (install, "_write"), (Path, "replace")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("action", ["install", "back"])
 def test_a_kill_at_any_step_loses_no_model_and_mixes_none(
     edge, installed, new, old, running, monkeypatch, action

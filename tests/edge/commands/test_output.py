@@ -50,16 +50,6 @@ def test_a_recording_is_named_with_its_labels_before_what_was_decided(terminal, 
     )
 
 
-def test_the_demo_ends_with_how_many_decisions_are_right(terminal, capsys):
-    assert main(["demo"]) == 0
-    out = capsys.readouterr().out
-    assert out.count(" mobility ") == 4
-    answers = 4 * len(Model(demo.MODEL).info.tasks)
-    assert out.splitlines()[-1].startswith(
-        f"{answers} of {answers} decisions are right"
-    )
-
-
 @pytest.mark.parametrize(
     ("line", "text"),
     [

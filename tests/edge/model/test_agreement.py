@@ -35,8 +35,3 @@ def test_the_answer_has_the_smallest_sum_of_all_that_agree():
 def test_two_labels_decided_apart_name_the_label_of_their_product():
     assert product_label(FACTORS, {"mobility": 1, "softness": 0}) == 1
     assert product_label(FACTORS, {"softness": 1, "mobility": 0}) == 2
-
-
-def test_a_pair_that_was_never_met_has_no_name():
-    met = {"mobility": (0, 1, 0), "softness": (0, 0, 1)}
-    assert product_label(met, {"mobility": 1, "softness": 1}) is None

@@ -1,26 +1,18 @@
 """ONNX Runtime and numpy give the same bits; numpy steps in where the other is missing."""
 
 import logging
-import os
 import sys
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
 import edge as edge_package
 from edge import demo
 from edge.errors import EdgeError, InputError
 from edge.model.model import Model
-from export.graph import to_onnx
 from tests.conftest import ROOT
-from tests.export.test_graph import describe, fit, hard_set
-from train.model.pipeline import Choice
 
 MODELS = [demo.MODEL, ROOT / "tests" / "golden" / "model.onnx"]
-RANDOM = int(os.environ.get("RANDOM_MODELS", "100"))
-"""Random models of the test; RANDOM_MODELS=1000 tries as many."""
 
 
 def assert_same_bits(path, vectors):
@@ -67,34 +59,6 @@ def test_the_models_of_the_checkout_have_the_same_bits_in_both(path):
     if golden.exists():
         vectors = np.concatenate([vectors, np.load(golden)["vectors"]])
     assert_same_bits(path, vectors)
-
-
-@settings(max_examples=RANDOM, deadline=None)
-@given(
-    kind=st.sampled_from(
-        ["plain", "lattice", "duplicates", "offset", "outlier", "far"]
-    ),
-    projection=st.sampled_from(["pca", "lda"]),
-    scaling=st.sampled_from(["none", "I", "III", "IV"]),
-    k=st.integers(1, 6),
-    labels=st.integers(2, 5),
-    seed=st.integers(0, 10**6),
-)
-def test_random_models_have_the_same_bits_in_both(
-    tmp_path_factory,
-    kind,
-    projection,
-    scaling,
-    k,
-    labels,
-    seed,
-):
-    X, queries = hard_set(kind, np.random.default_rng(seed))
-    k = min(len(X), k)
-    fitted = fit(X, {"t": Choice(scaling, 6, k, projection)}, labels=labels)
-    path = tmp_path_factory.mktemp("random") / "model.onnx"
-    path.write_bytes(to_onnx(fitted, describe(fitted, samples=8)))
-    assert_same_bits(path, queries)
 
 
 def without_onnxruntime(monkeypatch):

@@ -1,7 +1,6 @@
 """The graph in numpy: each operator by its definition in ONNX, and single values by name."""
 
 import numpy as np
-import onnx
 import pytest
 from onnx import TensorProto, helper, numpy_helper
 
@@ -88,16 +87,6 @@ def test_every_operator_of_an_exported_model_is_tried():
 @pytest.fixture
 def graph():
     return Graph(onnx_file.read(demo.MODEL.read_bytes(), "the demo"))
-
-
-def test_any_value_can_be_asked_for_by_name(graph):
-    product = graph.makers[graph.makers["mobility_neighbours"].inputs[0]]
-    z = product.inputs[0]
-    model = onnx.load(demo.MODEL)
-    assert z in {name for node in model.graph.node for name in node.output}
-    [coordinates] = graph.run([z], {"features": np.zeros((3, 120))})
-    assert coordinates.shape[0] == 3
-    np.testing.assert_array_equal(coordinates, np.rint(coordinates))
 
 
 def test_a_value_that_the_graph_lacks_and_a_shape_that_does_not_fit_are_named(graph):

@@ -8,11 +8,9 @@ from pathlib import Path
 import numpy as np
 import onnx
 import pytest
-from onnx import TensorProto, helper, numpy_helper
+from onnx import TensorProto, helper
 
 from edge.errors import InputError, OutOfRange
-from edge.model import onnx_file
-from edge.model.graph import Graph
 from edge.model.info import FORMAT, METADATA_KEY
 from edge.model.metadata import to_json
 from edge.model.metadata_reader import from_json
@@ -46,15 +44,6 @@ def test_a_byte_that_changed_since_the_export_is_noticed(exported, tmp_path):
         path.write_bytes(bytes([*data[:place], data[place] ^ 16, *data[place + 1 :]]))
         with pytest.raises(InputError, match="changed or damaged since its export"):
             Model(path)
-
-
-def test_metadata_say_what_the_board_needs(model, forearm):
-    info = model.info
-    assert list(info.tasks) == ["category", "object"]
-    assert info.tasks["category"].labels == ("rigid-fixed", "soft-fixed")
-    assert info.layout == forearm
-    assert info.rows == 16
-    assert len(info.data_digest) == 64
 
 
 def test_metadata_say_how_features_are_measured(model):
@@ -131,19 +120,6 @@ def another_input(proto):
     )
 
 
-def twice_as_many_neighbours(proto):
-    """It is known only after a sum."""
-    index, top = next(
-        (i, n)
-        for i, n in enumerate(proto.graph.node)
-        if "object_neighbours" in n.output
-    )
-    proto.graph.node.insert(
-        index, helper.make_node("Add", [top.input[1]] * 2, ["twice"])
-    )
-    proto.graph.node[index + 1].input[1] = "twice"
-
-
 def edited(edit):
     """The change of a model that edits its metadata."""
 
@@ -168,7 +144,6 @@ REFUSED = {
     no_metadata: "no edge-classify metadata",
     another_attribute: "ONNX Runtime refuses it",
     another_input: "has an input more",
-    twice_as_many_neighbours: "no tensor(double) object_distances of shape [3]",
     edited(dict.clear): "its metadata: not JSON",
     meta(samples=30): "no tensor(double) features of shape [90], which its metadata",
     meta(
@@ -252,41 +227,6 @@ def test_labels_that_are_made_of_their_factors_labels_stand_for_these(model):
     free_names = ("wall", "box", "sofa", "pillow")
     free = with_factors(model.info, free_names, [1, 1, 0, 0], [0, 1, 0, 1])
     assert from_json(free, "m").tasks["category"].labels == free_names
-
-
-@pytest.fixture(scope="module")
-def contents(exported):
-    return onnx_file.read((exported / "model.onnx").read_bytes(), "model")
-
-
-@pytest.fixture(scope="module")
-def proto(exported):
-    return onnx.load(exported / "model.onnx")
-
-
-def test_metadata_are_those_that_onnx_reads(contents, proto):
-    assert contents.metadata == {p.key: p.value for p in proto.metadata_props}
-    assert contents.foreign == []
-
-
-def test_nodes_are_those_that_onnx_reads(contents, proto):
-    assert len(contents.nodes) == len(proto.graph.node)
-    for node, expected in zip(contents.nodes, proto.graph.node, strict=True):
-        assert node.operator == expected.op_type
-        assert node.inputs == list(expected.input)
-        assert node.outputs == list(expected.output)
-        assert node.attributes == {a.name: a.i for a in expected.attribute}
-
-
-def test_constants_inputs_and_outputs_are_those_that_onnx_reads(contents, proto):
-    graph = Graph(contents)
-    assert graph.inputs["features"] == ("tensor(double)", [None, 120])
-    assert graph.outputs["object_label"] == ("tensor(int64)", [None])
-    assert graph.constants.keys() == {t.name for t in proto.graph.initializer}
-    for tensor in proto.graph.initializer:
-        np.testing.assert_array_equal(
-            graph.constants[tensor.name], numpy_helper.to_array(tensor)
-        )
 
 
 RELEASED = Path(__file__).parents[2] / "golden" / "released"

@@ -22,13 +22,8 @@ def model(nodes, initial=(), **more):
         for n in ("x", "y")
     ]
     graph = helper.make_graph(nodes, "g", sides[:1], sides[1:], list(initial))
-    proto = helper.make_model(
-        graph,
-        opset_imports=[helper.make_opsetid("", 18)],
-        **more,
-    )
-    helper.set_model_props(proto, {"kind": "a test", "umlaut": "ä"})
-    return proto
+    opset = [helper.make_opsetid("", 18)]
+    return helper.make_model(graph, opset_imports=opset, **more)
 
 
 def add(name="Add", **attributes):

@@ -35,13 +35,6 @@ def messages(listener):
             return lines
 
 
-def test_ready_and_stopping_are_one_datagram_each(manager, notifier):
-    service = notifier()
-    service.ready("reading skin.toml")
-    service.stopping()
-    assert messages(manager) == ["READY=1\nSTATUS=reading skin.toml", "STOPPING=1"]
-
-
 def test_a_sign_of_life_goes_out_twice_in_the_time_allowed_however_often_it_is_given(
     manager,
     clock,

@@ -1,7 +1,6 @@
 """From bytes to trusted values: which taxels are valid, and which chips are doubted."""
 
 from dataclasses import replace
-from math import erf, sqrt
 
 import numpy as np
 import pytest
@@ -12,7 +11,6 @@ from edge.fake.player import calibrated, fake_buses, fake_skin, still
 from edge.skin.decoder import (
     CONVERSION_FRAMES,
     NEVER_STUCK,
-    repeat_chance,
     stuck_limits,
 )
 from edge.skin.file import Reading, TaxelCalibration
@@ -114,15 +112,6 @@ def test_equal_readings_prove_a_frozen_chip_only_where_noise_shows_in_counts(
     """At a noise of 0.5 counts a taxel repeats with the chance 0.59: the twelve of an
     AD7147 do so five times in a row with less than 1e-12."""
     assert (stuck_limits(calibrated(CODY, noise)) == limit).all()
-
-
-def test_the_chance_of_an_equal_reading_is_that_of_a_rounded_normal_value():
-    """Beside the sum of squared probabilities of the whole numbers."""
-    noise = np.array([0.7, 1.0, 2.0, 8.0])
-    edges = np.arange(-100, 101) - 0.5
-    below = [[erf(edge / (sigma * sqrt(2))) / 2 for edge in edges] for sigma in noise]
-    exact = np.square(np.diff(below, axis=1)).sum(axis=1)
-    np.testing.assert_allclose(repeat_chance(noise), exact, rtol=0.08)
 
 
 @pytest.mark.parametrize(

@@ -1,13 +1,10 @@
 """`edge-classify explain`: the nearest trials by name, and what pulls."""
 
 from dataclasses import replace
-from itertools import islice
-from pathlib import Path
 
 import numpy as np
 import pytest
 
-from edge.model.model import Model
 from edge.tools.explain import Explanation, Near, Space, explain
 from tests.sequential import fitted_model
 from train.model.pipeline import Choice
@@ -46,8 +43,6 @@ def test_what_cannot_be_explained_is_one_sentence(exported, quiet, refused):
     assert "quiet.npz: holds no contact; leave it out" in err
 
 
-GOLDEN = Path(__file__).parents[2] / "golden"
-
 BY_HAND = Space(
     columns=np.arange(3),
     mean=np.array([10.0, 10.0, 0.0]),
@@ -77,12 +72,6 @@ def test_a_trial_without_a_label_is_no_rival():
     assert by_hand(BY_HAND._replace(labels=np.array([0, -1]))).rival is None
 
 
-def why_of(info, space, vector, rows, label):
-    """The explanation of a decision, and the distances of the trials that voted."""
-    why = explain(space, vector, rows.tolist(), label, info.features, info.widths)
-    return why, [near.distance for near in why.voters]
-
-
 def test_a_task_is_explained_by_its_own_columns_and_trials_at_the_full_window(
     model, tmp_path
 ):
@@ -107,9 +96,11 @@ def test_a_task_is_explained_by_its_own_columns_and_trials_at_the_full_window(
         for vector in vectors:
             decision = model.decide(vector)[name]
             answer = task.labels.index(decision.label)
-            rows = decision.neighbours
-            why, distances = why_of(model.info, space, vector, rows, answer)
+            rows = decision.neighbours.tolist()
+            why = explain(space, vector, rows, answer, info.features, info.widths)
+            distances = [near.distance for near in why.voters]
             assert distances == pytest.approx(decision.distances.tolist(), abs=1e-5)
+            assert why.rival.label != answer
             for near in (*why.voters, why.rival):
                 assert task.labels[near.label] == y[name][near.row]
 
@@ -118,26 +109,3 @@ def test_without_another_label_there_is_no_rival():
     why = by_hand(BY_HAND._replace(labels=np.array([0, 0])), voters=[1])
     pulls = {"force": -6.0, "area": 0.0}
     assert why == Explanation((Near(1, 0, np.sqrt(12.5), pulls),), None, {})
-
-
-@pytest.mark.parametrize("name", ["golden", "exported"])
-def test_the_parts_add_up_to_the_graphs_distances(name, exported):
-    folder = exported if name == "exported" else GOLDEN
-    model = Model(folder / "model.onnx")
-    golden = np.load(folder / "golden.npz")
-    info = model.info
-    for task in info.tasks:
-        space = Space.of(model, task)
-        reach = np.abs(space.rows).max()  # whose 22 bits are the graph's coordinates
-        keys = (f"{task}_{key}" for key in ("label", "distances", "neighbours"))
-        cases = zip(golden["vectors"], *map(golden.get, keys), strict=True)
-        for vector, label, expected, rows in islice(cases, 24):
-            why, distances = why_of(info, space, vector, rows, label)
-            assert distances == pytest.approx(expected, abs=1e-5 * reach)
-            z = ((vector[space.columns] - space.mean) * space.gain) @ space.weights
-            for near, distance in zip(why.voters, expected, strict=True):
-                row = space.rows[near.row]
-                square = z @ z + row @ row - sum(near.pulls.values())
-                assert square == pytest.approx(distance**2, abs=1e-5 * reach**2)
-            assert why.rival.label != label
-            assert why.rival.distance >= why.voters[0].distance

@@ -12,7 +12,6 @@ from edge.touch.arm import Chain
 @pytest.fixture
 def files(tmp_path, make_touch, urdf):
     """A URDF of two joints, and a recording of as many angles that names no arm."""
-    (tmp_path / "still.toml").write_text('[[joint]]\nname="a"\naxis=[0,0,0]\n')
     trial = make_touch(seconds=0.2)
     swing = np.linspace(0.0, 0.2, len(trial.t))
     trial = replace(trial, joints=np.column_stack([swing, 0.5 + swing]))
@@ -56,7 +55,6 @@ def test_a_trial_keeps_the_chain_of_a_toml_file(files, record):
         ("--arm arm.urdf --base base --tip upper", "gives 2 joint angles"),
         ("--arm arm.toml --tip skin", "--base and --tip are for a .urdf file"),
         ("--arm none.toml", "none.toml: cannot be read"),
-        ("--arm still.toml", "still.toml: joint a: its axis is zero"),
         ("--tip skin", "--base and --tip need --arm arm.urdf"),
     ],
 )

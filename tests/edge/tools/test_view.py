@@ -130,10 +130,3 @@ def test_the_caption_is_for_a_person():
     assert view.caption(frame(valid=valid), [], LAYOUT).endswith(
         "no contact  |  4 of 16 taxels cannot be read"
     )
-
-
-def test_a_skin_that_feels_everything_or_nothing_is_drawn():
-    for counts in (0, 65535):
-        f = Frame(t=0.0, counts=np.full((3, 5), counts, dtype=np.uint16))
-        colour, _ = view.skin_colours(f, SkinLayout(rows=3, cols=5), 1)
-        assert view.picture(colour).count("▀") == 2 * 5 * 2

@@ -23,15 +23,11 @@ CHANCE = np.random.default_rng(66).random((4, 2000))
 T = np.arange(2000) / 100.0
 BROKEN = {
     "stuck": 500 + 0 * NOISE,
-    "noise of 20 about 500": 500 + 20 * NOISE,
     "noise of 60 about 500": 500 + 60 * NOISE,
     "noise of 600 about 5000": 5000 + 600 * NOISE,
     "noise of 45 about 0": 45 * NOISE,
-    "noise of 60 about 0": 60 * NOISE,
     "flickers in 20 %": 500 * (CHANCE < 0.2),
-    "flickers in 50 %": 500 * (CHANCE < 0.5),
     "wanders by 20": 1000 + (20 * NOISE).cumsum(axis=1),
-    "swells by 300 a second": 300 * T + 0 * NOISE,
     "swells by 50 a second": 50 * T + 0 * NOISE,
 }
 

@@ -32,8 +32,6 @@ def comb(side):
 
 
 SHAPES = {
-    "one": np.ones((1, 1), dtype=bool),
-    "row": np.array([[True, False, True, True]]),
     "spiral": spiral(40),
     "comb": comb(41),
     "upside down": comb(41)[::-1],

@@ -107,17 +107,7 @@ def test_every_share_is_that_of_aeon_s_minirocket_with_the_same_kernels(
     assert shares(values, table).astype(np.float32).tolist() == theirs.tolist()
 
 
-def test_the_largest_values_stay_exact():
-    values = np.full((32, SAMPLES), 1 << 60)
-    values[:, ::2] = 0
-    table = KernelTable((14,) * 32, (0,) * 504)
-    assert shares(values, table).tolist() == [a / n for a, n in by_hand(values, table)]
-
-
-def test_a_convolution_takes_one_to_nine_channels_the_same_on_every_machine():
-    mixes = kernels.mixes(32)
-    assert set(mixes.sum(axis=1).tolist()) == {1, 2, 3, 4, 6, 9}
-    assert np.flatnonzero(mixes[3]).tolist() == [1, 13, 16, 20, 23, 27]
+def test_a_convolution_takes_the_same_channels_on_every_machine():
     assert (kernels.mixes(1) == 1).all()
     # A model stores none of them: other draws would change the features of a stored
     # model.

@@ -68,14 +68,13 @@ def test_a_touch_that_may_be_under_way_is_seen_whole():
 
 
 def test_what_never_changes_is_a_late_contact_where_there_is_no_other():
-    assert onsets(frames(3.0, stuck={(2, 2): (0.0, 100)})) == [(0.0, True)]
-
-
-def test_a_late_contact_at_the_end_has_the_series_of_the_first_frames():
+    """It has the series of the first frames."""
     tracker = watchful(1.0)
     for frame in frames(3.0, stuck={(2, 2): (0.0, 100)}):
         assert tracker.push(frame) == []
     (contact,) = tracker.finish()
+    assert contact.late
+    assert contact.onset_s == 0.0
     assert contact.series().t[-1] == pytest.approx(1.0)
     assert set(contact.series().peak) == {100}
 

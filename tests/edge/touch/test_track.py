@@ -76,16 +76,6 @@ def test_nothing_is_kept_beyond_the_horizon():
     assert follow([30] * 20, horizon_s=0.055) == [(0.0, [30] * 7, False)]
 
 
-def test_motion_counts_from_the_reading_that_counts():
-    """Where the first instant was read twice, the later reading is the onset's
-    place."""
-    frames = [
-        pressed(FLAT, t, {(1, col): 50}) for t, col in [(0.0, 1), (0.0, 3), (0.01, 4)]
-    ]
-    contact = followed(FLAT, frames, AT_ONCE)
-    assert contact.series().motion == pytest.approx([0.0, 0.01], abs=1e-16)
-
-
 def test_a_reading_without_contact_replaces_none_of_its_instant():
     taxels = [(0.0, {(1, 1): 50}), (0.0, {(1, 3): 50}), (0.0, {}), (0.01, {(1, 4): 50})]
     frames = [pressed(FLAT, t, pressed_taxels) for t, pressed_taxels in taxels]
