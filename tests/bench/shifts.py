@@ -152,7 +152,7 @@ def scene_changes(scene):
         stiffness = scaled(scene.stiffness, factor)
         changes[f"arm stiffness x {factor:g}"] = {"stiffness": stiffness}
     for name, effect in EFFECTS.items():
-        if effect.stage in ("sensor", "clock"):
+        if effect.stage != "contact":
             word = "without" if name in scene.add else "with"
             changes[f"{word} {name}"] = {"add": tuple({*scene.add} ^ {name})}
     return {name: replace(scene, **fields) for name, fields in changes.items()}

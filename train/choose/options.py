@@ -1,7 +1,5 @@
 """The settings that a fit holds fixed, and the trials that it then measures."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial

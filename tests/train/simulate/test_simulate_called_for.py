@@ -123,7 +123,7 @@ def bits(batch, i):
 
 
 def test_results_do_not_depend_on_the_batch():
-    sensors = [n for n, info in EFFECTS.items() if info.stage in ("sensor", "clock")]
+    sensors = [n for n, info in EFFECTS.items() if info.stage != "contact"]
     add = ["tilt", "inertia", *sensors]
     trial_scene = scene(*add, objects=everything(), after_s=0.4, count=2)
     every = tuple(spec for specs in kinds(trial_scene).values() for spec in specs)
