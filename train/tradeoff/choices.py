@@ -10,14 +10,13 @@ import numpy as np
 
 from edge.touch.features import WINDOW_S
 from edge.touch.layout import SkinLayout
-from train.choose.candidates import candidates, features_of
 from train.choose.evaluate import Result
-from train.choose.options import FitOptions, Loaded, trials_of
+from train.choose.options import FitOptions, Loaded, features_tried, trials_of
 from train.choose.settings import Chosen
 from train.choose.windows import windows_of
 from train.data.dataset import DataSet, Measurement, Recordings, load_trials
 from train.data.feature_sets import expand
-from train.data.groups import TRIAL, kinds_of
+from train.data.groups import TRIAL
 from train.fitting import fit
 from train.report.score import paired
 from train.report.work import Workers
@@ -62,16 +61,8 @@ def followed(
         quick: the candidates of a quick choice.
         like: a skin whose thresholds are taken; those of the recordings where None.
     """
-    are_drawn = kinds_of(raw.recordings) is not None
-    usual = candidates(
-        {},
-        joints=raw.mostly_have("joints"),
-        shear=raw.mostly_have("shear"),
-        drawn=are_drawn,
-        quick=quick,
-    )
     measurement = Measurement(
-        expand([*features_of(usual), *features]),
+        expand([*features_tried(raw, quick=quick), *features]),
         WINDOWS_S[-1],
         threshold=None if like is None else like.threshold_counts,
         onset=None if like is None else like.onset,
