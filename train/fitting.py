@@ -1,7 +1,5 @@
 """Recordings to a fitted model: load, choose, calibrate, fit."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property

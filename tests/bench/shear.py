@@ -6,6 +6,7 @@ features of shear among the candidates, and without them, on the same trials. Ga
 means over the seeds, with the 95 % interval of the mean (Student's t).
 """
 
+from itertools import product
 from pathlib import Path
 
 import numpy as np
@@ -16,32 +17,32 @@ from tests.bench.program import start
 from train.data.dataset import read
 from train.report.work import Workers
 from train.simulate import run, scene
-from train.tradeoff import shear
-from train.tradeoff.choices import WINDOWS_S, followed
+from train.tradeoff.choices import chosen, followed, unseen
+from train.tradeoff.costs import without_shear
 
 SCENE = tables.SCENES / "cody18_shear.toml"
 SHOWN_S = (0.2, 0.4, 0.6, 0.8, 1.0, 1.2)
 """Windows of the table of gains."""
+KINDS = {"known objects": lambda choice: choice.by_trial, "unseen objects": unseen}
+"""{kind: the accuracy of a choice on it}."""
 
 
 def compared(seed, folder, jobs):
-    """The answers with shear and without on the trials of one seed."""
+    """The choices with shear at each window on the trials of one seed, then those
+    without."""
     data = folder / str(seed)
     run.write(scene.load(SCENE, seed=seed), data)
     dataset = followed(read([str(data)]))
-    return shear.compared(dataset, WINDOWS_S, Workers(jobs))
+    cases = product((dataset, without_shear(dataset)), SHOWN_S)
+    return Workers(jobs).map(data.name, chosen, list(cases))
 
 
-def gain(runs, task, window, kind):
+def gain(pairs, task, result_of):
     """The mean of the paired differences in points, with its 95 % interval."""
     differences = []
-    for pair in runs:
-        before = pair.plain.shares(task, kind)[window]
-        after = pair.sheared.shares(task, kind)[window]
-        if before is not None and after is not None:
-            differences.append(100.0 * (after - before))
-    if not differences:
-        return ""
+    for pair in pairs:
+        after, before = (np.mean(result_of(choices[task]).hits) for choices in pair)
+        differences.append(100.0 * (after - before))
     mean = np.mean(differences)
     reach = t.ppf(0.975, len(differences) - 1) * sem(differences)
     return f"{mean:+.1f} ({mean - reach:+.1f} to {mean + reach:+.1f})"
@@ -50,21 +51,21 @@ def gain(runs, task, window, kind):
 def gains(runs):
     """The points gained at each window."""
     rows = []
-    for task in runs[0].plain.tasks:
-        for kind in (shear.KNOWN, shear.UNSEEN):
-            cells = {f"{w:g} s": gain(runs, task, w, kind) for w in SHOWN_S}
-            if any(cells.values()):
-                rows.append({"points gained": f"{task}, {kind}", **cells})
+    for task, choice in runs[0][0].items():
+        for kind, result_of in KINDS.items():
+            if result_of(choice):
+                row = {"points gained": f"{task}, {kind}"}
+                for i, window in enumerate(SHOWN_S):
+                    pairs = [choices[i :: len(SHOWN_S)] for choices in runs]
+                    row[f"{window:g} s"] = gain(pairs, task, result_of)
+                rows.append(row)
     return rows
 
 
 def measure(seeds, jobs, out):
     """Measure, and write the table."""
     first = scene.load(SCENE).seed
-    runs = []
-    for seed in range(first, first + seeds):
-        print(f"seed {seed}", flush=True)
-        runs.append(compared(seed, out, jobs))
+    runs = [compared(first + i, out, jobs) for i in range(seeds)]
     tables.write("shear", [gains(runs)], "make shear")
 
 

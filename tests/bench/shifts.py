@@ -32,7 +32,7 @@ from train.progress import bar
 from train.simulate import scene as scenes
 from train.simulate.engine import run_physics
 from train.simulate.run import batches_of, file_name, recordings, simulate
-from train.simulate.schema import EFFECTS
+from train.simulate.schema import SENSOR_EFFECTS
 
 SCENE = tables.SCENES / "cody18.toml"
 STRANGE = tables.SCENES / "household.toml"
@@ -151,10 +151,9 @@ def scene_changes(scene):
     for factor in (0.5, 2.0):
         stiffness = scaled(scene.stiffness, factor)
         changes[f"arm stiffness x {factor:g}"] = {"stiffness": stiffness}
-    for name, effect in EFFECTS.items():
-        if effect.stage in ("sensor", "clock"):
-            word = "without" if name in scene.add else "with"
-            changes[f"{word} {name}"] = {"add": tuple({*scene.add} ^ {name})}
+    for name in SENSOR_EFFECTS:
+        word = "without" if name in scene.add else "with"
+        changes[f"{word} {name}"] = {"add": tuple({*scene.add} ^ {name})}
     return {name: replace(scene, **fields) for name, fields in changes.items()}
 
 

@@ -1,7 +1,5 @@
 """The answers of all candidates to the trials that a fit leaves out."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any

@@ -1,7 +1,5 @@
 """The choice among the candidates, by nested cross-validation."""
 
-from __future__ import annotations
-
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 from functools import partial

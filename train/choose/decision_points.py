@@ -1,7 +1,5 @@
 """The usual decision points of a model: as many as calibration and its size allow."""
 
-from __future__ import annotations
-
 from edge.touch.features import WINDOW_S
 from train.choose.options import FitOptions
 from train.choose.settings import Settings

@@ -8,8 +8,6 @@ away. No trial of fold i takes part in what is dropped, so the accuracy of the c
 stays a nested one. The same trials give the same choice.
 """
 
-from __future__ import annotations
-
 from itertools import combinations_with_replacement
 
 Pair = tuple[int, int]

@@ -1,7 +1,5 @@
 """The settings that a fit holds fixed, and the trials that it then measures."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
@@ -11,7 +9,7 @@ from joblib import cpu_count
 from edge.errors import InputError
 from edge.touch.arm import Chain
 from edge.touch.features import SAMPLES
-from train.choose.candidates import Fixed, candidates, features_of
+from train.choose.candidates import CHOOSE_ALL, Fixed, candidates, features_of
 from train.choose.choose import Choosing
 from train.data import pieces, thresholds
 from train.data.contacts import Untouched
@@ -97,6 +95,21 @@ class Loaded:
     notes: list[str]
 
 
+def features_tried(
+    recordings: Recordings, fixed: Fixed = CHOOSE_ALL, *, quick: bool
+) -> tuple[str, ...]:
+    """The features of all candidates for recordings."""
+    usual = candidates(
+        {},
+        fixed,
+        joints=recordings.mostly_have("joints"),
+        shear=recordings.mostly_have("shear"),
+        drawn=kinds_of(recordings.recordings) is not None,
+        quick=quick,
+    )
+    return features_of(usual)
+
+
 def trials_of(
     recordings: Recordings,
     windows: tuple[float, ...],
@@ -104,15 +117,8 @@ def trials_of(
 ) -> Loaded:
     """The trials of recordings, up to the last of some windows, by thresholds that are
     given, saved, proposed or chosen."""
-    usual = candidates(
-        {},
-        options,
-        joints=recordings.mostly_have("joints"),
-        shear=recordings.mostly_have("shear"),
-        drawn=kinds_of(recordings.recordings) is not None,
-        quick=options.quick,
-    )
-    measurement = Measurement(features_of(usual), windows[-1], arm=options.arm)
+    features = features_tried(recordings, options, quick=options.quick)
+    measurement = Measurement(features, windows[-1], arm=options.arm)
 
     def by(
         threshold: int | None,

@@ -1,8 +1,6 @@
 """What is left out to choose a task's settings and to measure them: single trials, or
 entire groups of them."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 

@@ -1,8 +1,6 @@
 """How one of several candidates is chosen, and what is clearly behind, by paired
 comparisons."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The settings that a fit has chosen."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 

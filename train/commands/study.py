@@ -5,38 +5,19 @@ CSV.
 """
 
 import argparse
-import os
-from pathlib import Path
 
 from edge.commands.options import within
 from edge.writing import check_writable
+from train.report.options import add_report_options
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
     """Add the command's options."""
+    add_report_options(parser, "build/study")
     option = parser.add_argument
-    option(
-        "--data",
-        nargs="+",
-        required=True,
-        metavar="REC",
-        help=".npz recordings or folders",
-    )
     option(
         "--scene",
         help="the scene that the recordings were simulated from: adds the paper's numbers",
-    )
-    option(
-        "--out",
-        type=Path,
-        default=Path("build/study"),
-        help="folder (default: %(default)s)",
-    )
-    option(
-        "--jobs",
-        type=within(int, 1, 1000),
-        default=os.cpu_count() or 1,
-        help="processes (default: all cores)",
     )
     option(
         "--seeds",

@@ -6,26 +6,18 @@ CSV, and front.json, which `python -m export --front` reads.
 
 import argparse
 import math
-import os
 from contextlib import suppress
-from pathlib import Path
 
-from edge.commands.options import within
 from edge.errors import InputError
 from edge.saving import find
 from edge.writing import check_writable
+from train.report.options import add_report_options
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
     """Add the command's options."""
+    add_report_options(parser, "build/tradeoff")
     option = parser.add_argument
-    option(
-        "--data",
-        nargs="+",
-        required=True,
-        metavar="REC",
-        help=".npz recordings or folders",
-    )
     text = "file that `edge-classify bench` wrote of a model fitted on these recordings"
     option("--board", metavar="board.json", help=text)
     text = "only see whether there are enough recordings, before the long work"
@@ -41,18 +33,6 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     text = "try few candidates at each window; the table of savings has all as a row"
     option("--quick", action="store_true", help=text)
     option("--task", help="task of front.json (default: category, or else the first)")
-    option(
-        "--out",
-        type=Path,
-        default=Path("build/tradeoff"),
-        help="folder (default: %(default)s)",
-    )
-    option(
-        "--jobs",
-        type=within(int, 1, 1000),
-        default=os.cpu_count() or 1,
-        help="processes (default: all cores)",
-    )
 
 
 def cost(text: str) -> tuple[float, float]:

@@ -1,7 +1,5 @@
 """Folds of trials, and of entire groups of them, that are left out together."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from edge.arrays import Integers

@@ -1,8 +1,6 @@
 """Signs that an accuracy will not hold in use: recordings that are copies, first frames
 that tell labels, and recordings that begin in contact."""
 
-from __future__ import annotations
-
 import hashlib
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """The tasks of a data set that are fitted."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

@@ -9,11 +9,9 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from edge.recording import Recording
-from edge.touch.active import Region
 from edge.touch.contact import FeatureSeries
 from edge.touch.features import FEATURES, WINDOW_S
 from edge.touch.first_contact import first_contact
-from edge.touch.frame import Frame
 from edge.touch.layout import SkinLayout
 from edge.touch.region import largest_region
 from edge.touch.track import ContactTracker
@@ -21,8 +19,6 @@ from edge.writing import write_whole
 from train.data.arms import arm_of
 
 FRAMES = 6
-ARROW = 2.0
-"""Taxels that the longest arrow of shear spans."""
 HORIZON_S = 2.0
 PLAIN_TEXT: dict[Any, Any] = {"text.parse_math": False}
 """A label with two dollar signs is no formula."""
@@ -96,15 +92,6 @@ def curves(series: FeatureSeries) -> dict[str, NDArray[Any]]:
     }
 
 
-def _shear(axis: Any, frame: Frame, region: Region, counts: float) -> None:
-    """Draw the shear of a region's taxels as arrows; one of `counts` spans a taxel."""
-    assert frame.shear is not None
-    rows, cols = np.nonzero(region.mask)
-    along, around = frame.shear[rows, cols].T / counts
-    style = {"angles": "xy", "scale_units": "xy", "scale": 1.0, "width": 0.012}
-    axis.quiver(cols, rows, around, along, color="white", **style)
-
-
 def _frames(
     figure: Any,
     grid: Any,
@@ -120,9 +107,6 @@ def _frames(
     places = np.searchsorted(t, times).clip(0, len(t) - 1)
     scale = layout.counts_per_newton or 1.0
     top = max(int(recording.frames[places].max()), 1) / scale
-    longest = 1.0
-    if recording.shear is not None:
-        longest = max(float(np.abs(recording.shear[places].astype(float)).max()), 1.0)
     axes = [figure.add_subplot(grid[0, i]) for i in range(FRAMES)]
     for axis, k in zip(axes, places, strict=True):
         counts = frames[k].counts
@@ -139,8 +123,6 @@ def _frames(
         )
         title = f"{t[k] - onset:+.2f} s"
         if region is not None:
-            if frames[k].shear is not None:
-                _shear(axis, frames[k], region, longest / ARROW)
             axis.contour(
                 region.mask.astype(float),
                 levels=[0.5],

@@ -1,7 +1,5 @@
 """Answers to trials by models that were fitted without them."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 

@@ -9,8 +9,6 @@ probability that the thing is known. Its curve is raised by as much, so that the
 confidence of known things stays right.
 """
 
-from __future__ import annotations
-
 import numpy as np
 from scipy.special import expit
 from sklearn.linear_model import LogisticRegression

@@ -41,8 +41,6 @@ PHONE = 3.6
 """Inches."""
 MATRIX_TEXT = 20
 """A confusion matrix of more classes does not show its numbers."""
-MOST_NAMES = 40
-"""One of more classes numbers its columns."""
 MATRIX_SHARES = 4
 """One of at most so many classes shows shares too."""
 MANY_CLASSES = 6
@@ -144,25 +142,14 @@ def confusion(name: str, title: str, truth: Strings, answers: Strings) -> Figure
 
 
 def _name_sides(axes: Any, classes: Strings, phone: bool) -> None:
-    """Name the rows and the columns of a confusion matrix; of very many columns, only
-    some, by their row's number."""
+    """Name the rows and the columns of a confusion matrix."""
     n = len(classes)
     is_large = n > MANY_CLASSES
     small = 7 if (phone and is_large) or n > MATRIX_TEXT else None
-    answer = "answer"
-    if n > MOST_NAMES:
-        answer = "answer, as a row's number"
-        places = np.arange(0, n, -(-n // MATRIX_TEXT))
-        axes.set_xticks(places, places + 1, fontsize=small)
-        names = [f"{name}  {i}" for i, name in enumerate(classes, 1)]
-    else:
-        names = list(classes)
-        style = (
-            {"rotation": 90} if is_large or phone else {"rotation": 30, "ha": "right"}
-        )
-        axes.set_xticks(range(n), names, fontsize=small, **style)
-    axes.set_yticks(range(n), names, fontsize=small)
-    axes.set(xlabel=answer, ylabel="label")
+    style = {"rotation": 90} if is_large or phone else {"rotation": 30, "ha": "right"}
+    axes.set_xticks(range(n), classes, fontsize=small, **style)
+    axes.set_yticks(range(n), classes, fontsize=small)
+    axes.set(xlabel="answer", ylabel="label")
 
 
 def _draw_matrix(axes: Any, counts: Integers, fontsize: int | None) -> None:

@@ -96,7 +96,8 @@ def measured(scene: Scene) -> dict[Kind, Convergence]:
 
 def _middle(value: Value) -> Value:
     """The value halfway between the limits, without a range."""
-    return Value(value.middle, value.middle)
+    middle = 0.5 * (value.low + value.high)
+    return Value(middle, middle)
 
 
 @dataclass

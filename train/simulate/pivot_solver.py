@@ -190,11 +190,7 @@ class Pivots:
         return np.where(force > 0.0, np.array([force, moment]), 0.0)
 
 
-def search(
-    pivots: Pivots,
-    guess: Array,
-    guarded_rounds: int = GUARDED_ROUNDS,
-) -> tuple[Array, Array, Mask]:
+def search(pivots: Pivots, guess: Array) -> tuple[Array, Array, Mask]:
     """The loads (F, M) with y = free - C (F, M), searched for from a guess (2, n) of
     them; the force on each row (rows, n), and (n,) whether the search failed.
 
@@ -206,7 +202,7 @@ def search(
         [c[0] * guess[0] + c[1] * guess[1], c[1] * guess[0] + c[2] * guess[1]]
     )
     loads = pivots.loads(y)
-    for turn in range(ROUNDS + guarded_rounds):
+    for turn in range(ROUNDS + GUARDED_ROUNDS):
         p = pivots.step(y, loads)
         searching = (np.abs(p[0]) > CLOSE_M) | (np.abs(p[1]) > CLOSE_RAD)
         if not searching.any():

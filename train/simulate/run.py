@@ -105,26 +105,23 @@ def simulate_trials(
 
 
 def batches_of(
-    scene: Scene,
-    batch: int | None = None,
-    convergences: dict[Kind, Convergence] | None = None,
+    scene: Scene, convergences: dict[Kind, Convergence] | None = None
 ) -> list[tuple[TrialSpec, ...]]:
     """Batches of the scene's trials, of about equal work.
 
     Args:
-        batch: most trials in each; as many as suit the scene where None.
         convergences: the measured steps (`measured`), for a scene that gives no step.
     """
     if convergences is None:
         convergences = measured(scene)
     every = [spec for specs in kinds(scene, convergences).values() for spec in specs]
-    count = math.ceil(len(every) / (batch or batch_size(scene)))
+    count = math.ceil(len(every) / batch_size(scene))
     return [tuple(every[i::count]) for i in range(count)]
 
 
-def simulate(scene: Scene, batch: int | None = None) -> Iterator[tuple[str, Recording]]:
+def simulate(scene: Scene) -> Iterator[tuple[str, Recording]]:
     """(file name, recording) of each trial of a scene, simulated in this process."""
-    for specs in batches_of(scene, batch):
+    for specs in batches_of(scene):
         yield from simulate_trials(scene, specs)
 
 
@@ -148,7 +145,7 @@ def write(
     check_writable(target)
     convergences = measured(scene)
     first = {kind: specs[0] for kind, specs in kinds(scene).items()}
-    batches = batches_of(scene, convergences=convergences)
+    batches = batches_of(scene, convergences)
     paths = []
     redrawn: Counter[str] = Counter()
     unfelt = 0

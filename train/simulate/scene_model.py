@@ -22,11 +22,6 @@ class Value:
     low: float
     high: float
 
-    @property
-    def middle(self) -> float:
-        """The value halfway between the limits."""
-        return 0.5 * (self.low + self.high)
-
 
 class SceneTable(ConfigTable):
     """A table of a scene, which checks numbers against the schema."""

@@ -28,9 +28,6 @@ class Effect:
     """When a trial calls for an effect; the module of its name, loaded only then,
     computes it."""
 
-    stage: str
-    """`contact` (acts in the step), `sensor` (on the frames) or `clock` (on their
-    times)."""
     settings: dict[str, Field] = field(default_factory=dict)
     needs: tuple[str, ...] = ()
     """Effects that it builds upon."""
@@ -167,52 +164,54 @@ def keys_of(family: str) -> dict[str, float | None]:
 
 
 ELASTIC = ("foam", "pillow")
-EFFECTS: dict[str, Effect] = {
-    # Effects run in this order, in the step and on the frames.
-    "foundation": Effect("contact", families=ELASTIC),
-    "lateral": Effect("contact", needs=("foundation",), families=ELASTIC),
-    "bottoming": Effect("contact", needs=("foundation",), families=ELASTIC),
-    "cover": Effect("contact", keys=("cover_n_m",)),
-    "pop": Effect("contact", families=("bubbles",)),
-    "stems": Effect("contact", families=("foliage",)),
-    "upright": Effect("contact", needs=("stems",), keys=("stem_height_m",)),
-    "tilt": Effect("contact", families=("rigid", "foam", "pillow", "bubbles")),
-    "relaxation": Effect("contact", families=ELASTIC),
+CONTACT_EFFECTS = {
+    "foundation": Effect(families=ELASTIC),
+    "lateral": Effect(needs=("foundation",), families=ELASTIC),
+    "bottoming": Effect(needs=("foundation",), families=ELASTIC),
+    "cover": Effect(keys=("cover_n_m",)),
+    "pop": Effect(families=("bubbles",)),
+    "stems": Effect(families=("foliage",)),
+    "upright": Effect(needs=("stems",), keys=("stem_height_m",)),
+    "tilt": Effect(families=("rigid", "foam", "pillow", "bubbles")),
+    "relaxation": Effect(families=ELASTIC),
     # loss_s: dashpot by stiffness
-    "inertia": Effect("contact", {"loss_s": Field(0.0, 1.0, 0.0015)}),
+    "inertia": Effect({"loss_s": Field(0.0, 1.0, 0.0015)}),
     # shear_n_m: stiffness of the skin along the face
-    "friction": Effect(
-        "contact", {"shear_n_m": above_0(1e12, 1e4)}, keys=("skin_friction",)
-    ),
-    "sliding": Effect("contact", condition="movable"),
-    "slope": Effect("contact", needs=("sliding",), keys=("slope_deg",)),
-    "turning": Effect("contact", needs=("sliding",), keys=("aside_m", "foot_m")),
-    "stribeck": Effect("contact", needs=("sliding",), keys=("stribeck_m_s",)),
-    "tipping": Effect("contact", needs=("sliding",), keys=("base_m", "height_m")),
-    "shear": Effect("contact", axes=3),
+    "friction": Effect({"shear_n_m": above_0(1e12, 1e4)}, keys=("skin_friction",)),
+    "sliding": Effect(condition="movable"),
+    "slope": Effect(needs=("sliding",), keys=("slope_deg",)),
+    "turning": Effect(needs=("sliding",), keys=("aside_m", "foot_m")),
+    "stribeck": Effect(needs=("sliding",), keys=("stribeck_m_s",)),
+    "tipping": Effect(needs=("sliding",), keys=("base_m", "height_m")),
+    "shear": Effect(axes=3),
+}
+"""Effects in the step."""
+SENSOR_EFFECTS = {
     # part: of each of four neighbours
-    "crosstalk": Effect("sensor", {"part": Field(0.0, 0.2, 0.02)}),
+    "crosstalk": Effect({"part": Field(0.0, 0.2, 0.02)}),
     # counts: half the loop's width
-    "hysteresis": Effect("sensor", {"counts": Field(0.0, 65535, 30.0)}),
+    "hysteresis": Effect({"counts": Field(0.0, 65535, 30.0)}),
     # counts_per_s: deviation of slopes
-    "drift": Effect("sensor", {"counts_per_s": Field(0.0, 65535, 5.0)}),
+    "drift": Effect({"counts_per_s": Field(0.0, 65535, 5.0)}),
     # counts: standard deviation
-    "noise": Effect("sensor", {"counts": Field(0.0, 65535, 8.0)}),
-    "saturation": Effect("sensor", {"newton": above_0(1e6, 17.0)}),  # newton: the limit
+    "noise": Effect({"counts": Field(0.0, 65535, 8.0)}),
+    "saturation": Effect({"newton": above_0(1e6, 17.0)}),  # newton: the limit
     # counts: readings below are zero
-    "dead_band": Effect("sensor", {"counts": Field(0.0, 65535, 50.0)}),
+    "dead_band": Effect({"counts": Field(0.0, 65535, 50.0)}),
     # counts: size of a step
-    "quantisation": Effect("sensor", {"counts": Field(1.0, 65535, 4.0)}),
+    "quantisation": Effect({"counts": Field(1.0, 65535, 4.0)}),
     # part: of all taxels; known: 1, they are marked invalid; 0, they read zero
     "dead_taxels": Effect(
-        "sensor",
         {"part": Field(0.0, 1.0, 0.01), "known": Field(0, 1, 1, integer=True)},
     ),
     # s: deviation, cut at 0.45 of a frame
-    "jitter": Effect("clock", {"s": Field(0.0, 1.0, 0.001)}),
+    "jitter": Effect({"s": Field(0.0, 1.0, 0.001)}),
     # part: of all frames
-    "dropped_frames": Effect("clock", {"part": Field(0.0, 0.9, 0.02)}),
+    "dropped_frames": Effect({"part": Field(0.0, 0.9, 0.02)}),
 }
+"""Effects on the frames, or on their times."""
+EFFECTS = {**CONTACT_EFFECTS, **SENSOR_EFFECTS}
+"""All of them, in the order in which they run."""
 STEP = Field(1e-5, 1.0)  # the physics' step
 SHARED = {"viscous": ("relaxation", "inertia")}
 """{module of `effects`: the effects that share it}."""

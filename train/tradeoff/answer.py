@@ -57,7 +57,7 @@ def early(measured: Measured) -> Section:
         {
             "task": task,
             "requested error %": percent(rule.error),
-            "right %": percent(1.0 - rule.wrong),
+            "right %": percent(rule.result.accuracy),
             "mean time s": round(rule.mean_s, 3),
             "at most s": round(rule.latest_s, 3),
             "points over waiting": points(rule.gain),

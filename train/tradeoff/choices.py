@@ -1,7 +1,7 @@
 """The choice of `make export`, made at each window and for changed recordings."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import replace
 from functools import partial
 from itertools import pairwise
 from typing import Any
@@ -10,14 +10,13 @@ import numpy as np
 
 from edge.touch.features import WINDOW_S
 from edge.touch.layout import SkinLayout
-from train.choose.candidates import candidates, features_of
 from train.choose.evaluate import Result
-from train.choose.options import FitOptions, trials_of
+from train.choose.options import FitOptions, Loaded, features_tried, trials_of
 from train.choose.settings import Chosen
 from train.choose.windows import windows_of
 from train.data.dataset import DataSet, Measurement, Recordings, load_trials
 from train.data.feature_sets import expand
-from train.data.groups import TRIAL, kinds_of
+from train.data.groups import TRIAL
 from train.fitting import fit
 from train.report.score import paired
 from train.report.work import Workers
@@ -32,33 +31,18 @@ Points = Mapping[float, Mapping[str, Chosen]]
 """{window: {task: the choice at that window}}."""
 
 
-@dataclass(frozen=True)
-class Prepared:
-    """The trials that `make export` would fit.
-
-    Attributes:
-        dataset: with export's thresholds, and the features of all its candidates.
-        windows: of the report: `CHOSEN_S`, and the longer ones that export tries.
-        notes: sentences that a user should read.
-    """
-
-    dataset: DataSet
-    windows: tuple[float, ...]
-    notes: Sequence[str]
-
-
-def prepared(raw: Recordings, *, quick: bool, jobs: int) -> Prepared:
-    """The trials of recordings as export takes them."""
+def prepared(raw: Recordings, *, quick: bool, jobs: int) -> Loaded:
+    """The trials of recordings as export takes them, and the windows of the report:
+    `CHOSEN_S`, and the longer ones that export tries."""
     options = FitOptions(quick=quick, jobs=jobs, progress=True)
     if quick:
-        loaded = trials_of(raw, CHOSEN_S, options)
-        return Prepared(loaded.dataset, CHOSEN_S, loaded.notes)
+        return trials_of(raw, CHOSEN_S, options)
     seconds = [float(r.t[-1] - r.t[0]) for r in raw.recordings]
     loaded = trials_of(raw, (*CHOSEN_S, windows_of(seconds)[-1]), options)
     trials = loaded.dataset.trials
     windows = windows_of([float(t.recording.t[-1]) - t.onset_s for t in trials])
     longer = tuple(window for window in windows if window > CHOSEN_S[-1])
-    return Prepared(loaded.dataset, (*CHOSEN_S, *longer), loaded.notes)
+    return replace(loaded, windows=(*CHOSEN_S, *longer))
 
 
 def followed(
@@ -77,16 +61,8 @@ def followed(
         quick: the candidates of a quick choice.
         like: a skin whose thresholds are taken; those of the recordings where None.
     """
-    are_drawn = kinds_of(raw.recordings) is not None
-    usual = candidates(
-        {},
-        joints=raw.mostly_have("joints"),
-        shear=raw.mostly_have("shear"),
-        drawn=are_drawn,
-        quick=quick,
-    )
     measurement = Measurement(
-        expand([*features_of(usual), *features]),
+        expand([*features_tried(raw, quick=quick), *features]),
         WINDOWS_S[-1],
         threshold=None if like is None else like.threshold_counts,
         onset=None if like is None else like.onset,

@@ -11,6 +11,7 @@ import numpy as np
 
 from edge.touch.features import WINDOW_S
 from edge.touch.layout import SkinLayout
+from edge.touch.measures import SHEAR, feature
 from train.choose.settings import Chosen
 from train.data.dataset import DataSet, Recordings
 from train.data.folds import finest, stratified_folds
@@ -19,7 +20,6 @@ from train.report.score import paired, points
 from train.report.section import Row, Section, Table, counted
 from train.report.skins import coarser
 from train.report.work import Workers
-from train.tradeoff import shear
 from train.tradeoff.choices import Points, chosen, followed
 from train.tradeoff.measured import Measured
 from train.tradeoff.wires import fits, microcontroller, spread, wire, wires
@@ -71,7 +71,8 @@ def changes(raw: Recordings, dataset: DataSet, rate_hz: float) -> list[Change]:
     name = "the paper's features"
     cases.append(Change(name, "only 3 features", dataset, options=paper))
     if dataset.layout.axes:
-        cases.append(Change("no shear", shear.price(dataset), shear.without(dataset)))
+        price = shear_price(dataset.layout)
+        cases.append(Change("no shear", price, without_shear(dataset)))
     cases += _fewer_trials(dataset)
     return cases
 
@@ -108,6 +109,23 @@ def _fewer_taxels(raw: Recordings, layout: SkinLayout) -> Iterator[Change]:
         price = f"a frame is {saved:.1f} ms shorter on {place}"
         name = counted(skin.rows * skin.cols, "taxel")
         yield Change(name, price, replace(raw, recordings=tuple(recordings)))
+
+
+def without_shear(dataset: DataSet) -> DataSet:
+    """The same trials without the features of shear."""
+    names = [name for name in dataset.names if feature(name).quantity not in SHEAR]
+    return dataset.of(names)
+
+
+def shear_price(layout: SkinLayout) -> str:
+    """What three axes cost on the wire."""
+    all_axes = microcontroller(layout)
+    normal_only = microcontroller(replace(layout, axes=None))
+    return (
+        f"{layout.rows * layout.cols * 4} bytes a frame fewer: "
+        f"{1.0 / normal_only.frame_s:.0f} frames a second on one bus at 1 MHz instead of "
+        f"{1.0 / all_axes.frame_s:.0f}"
+    )
 
 
 def _fewer_trials(dataset: DataSet) -> Iterator[Change]:

@@ -67,11 +67,6 @@ class Certified:
         return Promise(int(self.right.sum()), len(self.right))
 
     @property
-    def wrong(self) -> float:
-        """Share of wrong decisions."""
-        return 1.0 - self.result.accuracy
-
-    @property
     def gain(self) -> tuple[float, float, float]:
         """The points gained over waiting for the full window, and their 95 %
         interval."""

@@ -3,24 +3,13 @@
 from dataclasses import replace
 
 import pytest
-from matplotlib.image import imread
 
 from edge import demo
 from edge.recording import load
 from edge.saving import save
-from tests.edge.test_recording import sheared
 from train.__main__ import main
-from train.draw.recording import draw
 
 TOUCH = demo.recordings()[0]
-
-
-@pytest.fixture(scope="module")
-def plain(tmp_path_factory):
-    """The picture of a touch."""
-    out = tmp_path_factory.mktemp("picture") / "plain.png"
-    assert main(["show", str(TOUCH), "--out", str(out)]) == 0
-    return out
 
 
 @pytest.mark.parametrize("beside", [[], [str(TOUCH)]])
@@ -29,14 +18,6 @@ def test_a_label_with_dollar_signs_is_no_formula(tmp_path, beside):
     labels = {"object": r"a $\frac$ b"}
     save(tmp_path / "a.npz", replace(touch, meta={**touch.meta, "labels": labels}))
     assert main(["show", str(tmp_path / "a.npz"), *beside]) == 0
-
-
-def test_shear_adds_arrows(plain, tmp_path):
-    draw(sheared(load(TOUCH)), tmp_path / "arrows.png")
-    without, arrows = (imread(path) for path in (plain, tmp_path / "arrows.png"))
-    assert without.shape == arrows.shape
-    white = (arrows == 1.0).all(axis=2).sum() - (without == 1.0).all(axis=2).sum()
-    assert white > 100
 
 
 def test_a_recording_without_contact_is_drawn(make_touch, tmp_path):

@@ -2,15 +2,14 @@
 refused."""
 
 from dataclasses import dataclass, replace
-from functools import partial
 
 import numpy as np
 import pytest
 
 from edge.errors import EdgeError
 from tests.train.simulate.scenes import make, one_object, run
-from train.simulate.effects import tilt
-from train.simulate.pivot_solver import GUARDED_ROUNDS, Pivots, search
+from train.simulate import pivot_solver
+from train.simulate.pivot_solver import Pivots, search
 from train.simulate.scene_model import Value
 
 
@@ -70,7 +69,7 @@ class Beds:
         force = (inside * held).sum(axis=1)
         return np.array([force.sum(axis=0), (force * self.lever).sum(axis=0)])
 
-    def search(self, guarded_rounds=GUARDED_ROUNDS):
+    def search(self):
         """The simulator's answers (2, n), searched for from no load, and whether it
         lost them."""
         springs = self.gaps, self.stiffness[None]
@@ -79,7 +78,7 @@ class Beds:
         gain = np.ones(n)
         load = np.zeros((16, n))
         pivots = Pivots(*springs, *rows, gain, load, self.free, self.c)
-        loads, _, lost = search(pivots, np.zeros((2, n)), guarded_rounds)
+        loads, _, lost = search(pivots, np.zeros((2, n)))
         return loads, lost
 
     def error(self, loads):
@@ -108,12 +107,13 @@ class Beds:
         return np.abs(p0 - mean * p1) + 0.1 * np.abs(p1)
 
 
-def test_newton_on_the_tilt_needs_its_line_search():
+def test_newton_on_the_tilt_needs_its_line_search(monkeypatch):
     beds = Beds.drawn(600, seed=1)
     loads, lost = beds.search()
     assert beds.error(loads).max() < 1e-9
     assert not lost.any()
-    loads, lost = beds.search(guarded_rounds=0)
+    monkeypatch.setattr(pivot_solver, "GUARDED_ROUNDS", 0)
+    loads, lost = beds.search()
     wrong = beds.error(loads) > 1e-6
     assert wrong.sum() >= 1
     assert lost[wrong].all()
@@ -122,7 +122,7 @@ def test_newton_on_the_tilt_needs_its_line_search():
 def test_a_tilt_that_is_not_found_is_refused(monkeypatch):
     hard = replace(make(one_object(width_m=0.05), "tilt"), taxel_n_m=Value(1e8, 1e8))
     assert run(hard).force.max() > 0.0
-    monkeypatch.setattr(tilt, "search", partial(search, guarded_rounds=0))
+    monkeypatch.setattr(pivot_solver, "GUARDED_ROUNDS", 0)
     with pytest.raises(EdgeError, match="tilt was not found in 2 trials"):
         run(hard)
 

@@ -21,7 +21,7 @@ from train.simulate.plan import (
     summary,
 )
 from train.simulate.scene import from_dict
-from train.simulate.schema import EFFECTS
+from train.simulate.schema import EFFECTS, SENSOR_EFFECTS
 
 MOVES = {"mass_kg": 1.0, "friction_static": 0.5, "friction_kinetic": 0.4}
 
@@ -123,8 +123,7 @@ def bits(batch, i):
 
 
 def test_results_do_not_depend_on_the_batch():
-    sensors = [n for n, info in EFFECTS.items() if info.stage in ("sensor", "clock")]
-    add = ["tilt", "inertia", *sensors]
+    add = ["tilt", "inertia", *SENSOR_EFFECTS]
     trial_scene = scene(*add, objects=everything(), after_s=0.4, count=2)
     every = tuple(spec for specs in kinds(trial_scene).values() for spec in specs)
     together = run_batch(trial_scene, every)

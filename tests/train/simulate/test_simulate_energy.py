@@ -16,7 +16,7 @@ from tests.train.simulate.scenes import make, one_object, run, scene, specs_of
 from train.simulate import engine
 from train.simulate.convergence import kinds
 from train.simulate.plan import Call, make_plan
-from train.simulate.schema import EFFECTS
+from train.simulate.schema import CONTACT_EFFECTS, EFFECTS
 
 RANGES = {
     "stem_height_m": [0.3, 0.6],
@@ -52,8 +52,8 @@ OWN_RANGES = {
         "stem_damping": [0.05, 1.0],
     },
 }
+CONTACT = list(CONTACT_EFFECTS)
 MOVES = ("mass_kg", "friction_static", "friction_kinetic")
-CONTACT = [name for name, info in EFFECTS.items() if info.stage == "contact"]
 ROUNDING = 1e-9
 """As a part of all that went to and fro."""
 

@@ -6,7 +6,14 @@ import pytest
 
 from edge.skin import file as skinfile
 from edge.touch.layout import SkinLayout
-from train.tradeoff.wires import spread, wire, wire_time_s, wires
+from train.tradeoff.wires import (
+    microcontroller,
+    spread,
+    waited_s,
+    wire,
+    wire_time_s,
+    wires,
+)
 
 
 def test_cody_s_chips_over_three_buses_cost_what_the_shipped_file_costs():
@@ -45,3 +52,10 @@ def test_the_wire_is_that_of_the_recordings_or_unknown(make_touch, forearm):
     assert wire_time_s([wired], forearm, 100.0) == pytest.approx(0.0232)
     simulated = replace(touch, meta={**touch.meta, "simulation": {}})
     assert 0.005 < wire_time_s([simulated], forearm, 100.0) < 0.02
+
+
+def test_three_axes_take_three_times_the_bits(forearm):
+    three = replace(forearm, axes=3)
+    slower = microcontroller(three).frame_s / microcontroller(forearm).frame_s
+    assert slower == pytest.approx(3.0, rel=0.01)
+    assert waited_s(three, 100.0) > microcontroller(three).frame_s
