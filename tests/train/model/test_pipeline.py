@@ -31,18 +31,6 @@ def test_a_twentieth_of_a_labels_trials_stand_for_it_but_three_if_there_are():
     assert nearest_of_label(sizes).tolist() == [0, 2, 3, 3, 4, 5]
 
 
-def test_equal_distances_go_to_the_earlier_row():
-    rows = np.array([[-1.0], [1.0], [-1.0], [3.0]])
-    y = {"t": np.array(["d", "c", "b", "a"])}
-    for k in (1, 2, 3):
-        model = ContactClassifier({"t": Choice("none", 1, k)}, ["max_force"]).fit(
-            rows, y
-        )
-        assert model.tasks_["t"].classes[
-            model.decide(np.array([[0.0]]))["t"].labels
-        ] == ["d"]
-
-
 def test_the_projection_works_in_a_scikit_learn_pipeline():
     X = features(30)
     y = np.repeat(["a", "b"], 15)

@@ -3,14 +3,11 @@
 import mpmath
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
 from edge.errors import InputError
 from tests.hard_cases import exact
 from tests.hard_cases.models import features
 from train.model.projection import Projection, Spectrum, coordinate_bits, principal_axes
-from train.model.scaling import SCALINGS
 
 
 def test_components_match_long_double_and_have_a_fixed_sign():
@@ -51,28 +48,6 @@ def test_components_stop_at_the_rank():
     assert fitted.rank_ == 11
     rank_two = np.outer(np.arange(30.0), X[0]) + np.outer(np.arange(30.0) ** 2, X[1])
     assert Projection().fit(rank_two).rank_ == 2
-
-
-@settings(max_examples=25)
-@given(
-    seed=st.integers(0, 100),
-    scaling=st.sampled_from(SCALINGS),
-    offset=st.sampled_from([0.0, 1e3, 1e6]),
-    spread=st.sampled_from([1e-6, 1.0, 1e6]),
-)
-def test_coordinates_are_those_of_whole_numbers_in_any_order(
-    seed,
-    scaling,
-    offset,
-    spread,
-):
-    X = features(30, seed) * spread + offset
-    p = Projection(scaling, 4).fit(X)
-    z = p.transform(X)
-    assert (z / p.grid_.unit).tolist() == exact.coordinates(X, p, 4).tolist()
-    d = (X - p.mean_) * p.gain_
-    order = np.random.default_rng(seed).permutation(120)
-    assert (p.grid_.project(d[:, order], p.weights_[order]) == z).all()
 
 
 @pytest.mark.parametrize("kind", ["pca", "lda"])

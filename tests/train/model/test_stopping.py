@@ -12,7 +12,6 @@ from train.data.folds import stratified_folds
 from train.model.held_out import answers
 from train.model.pipeline import Choice
 from train.model.stopping import (
-    Early,
     SequentialClassifier,
     excess_of,
 )
@@ -53,12 +52,6 @@ def test_what_is_plain_from_the_second_decision_point_on_is_decided_there():
     new, truth = touches(300, seed=1)
     named, _ = answers(model.decision_points_, new)["t"]
     assert (named[1:] == truth).all()
-
-
-def test_points_before_the_full_window_have_settings_of_their_own():
-    full, first = map(of_neighbours, (1, 2))
-    model = SequentialClassifier(full, SECONDS, early=Early(first, []))
-    assert model.choices_at == [first, first, full]
 
 
 def test_an_excess_is_that_above_half_of_the_trials():
