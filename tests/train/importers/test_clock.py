@@ -57,13 +57,6 @@ def test_two_frames_in_a_hundred_at_one_time_stand_still():
         order(t, "a.bag")
 
 
-def test_angles_are_linear_between_messages():
-    joints_t = np.array([0.0, 0.1, 0.2])
-    angles = np.array([[0.0, 1.0], [0.2, 0.0], [0.4, 1.0]])
-    result = angles_at(np.array([0.05, 0.1, 0.15]), joints_t, angles, 0.3)
-    assert result == pytest.approx(np.array([[0.1, 0.5], [0.2, 0.0], [0.3, 0.5]]))
-
-
 def test_an_angle_that_wraps_goes_the_shorter_way():
     angles = np.array([[3.1], [-3.1]])
     (result,) = angles_at(np.array([0.05]), np.array([0.0, 0.1]), angles, 0.3)

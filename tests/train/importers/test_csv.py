@@ -26,13 +26,8 @@ def text(rows, mark=",", head="") -> str:
     return "\n".join([*([head] if head else []), *lines]) + "\n"
 
 
-def wide_with_a_header(folder):
-    (folder / "cup 3.csv").write_text(text(WIDE, head="time,a,b,c,d,e,f"))
-    return ["--taxels", "a-f"]
-
-
 def numbers_alone(folder):
-    (folder / "cup_3.txt").write_text(text(WIDE, "  "))
+    (folder / "cup 3.txt").write_text(text(WIDE, "  "))
     return ["--time", "1"]
 
 
@@ -93,7 +88,6 @@ def imported(folder, *words):
 @pytest.mark.parametrize(
     "form",
     [
-        wide_with_a_header,
         numbers_alone,
         an_array,
         a_matlab_file,
@@ -117,16 +111,6 @@ def test_a_file_of_values_by_their_sensors_is_a_trial(folder):
     put(folder, {"cup_1.csv": text(rows, head="timestamp_ms,sensor_id,value")})
     _, recordings = imported(folder)
     assert recordings["cup_1"].frames.tolist() == [[[0, 1]], [[100, 101]]]
-
-
-def test_a_set_that_lacks_a_scale_is_refused_and_nothing_is_written(folder, refusal):
-    files = {f"{i}.txt": f"0 0\n0.{i} 0\n" for i in range(5)}
-    put(folder, files)
-    out = folder.parent / "out"
-    message = refusal("import", "csv", folder, "--out", out, *RATE)
-    assert "1.txt: 0 to 0.1 are no counts" in message
-    assert "add --scale 10, or see" in message
-    assert not list(out.glob("*"))
 
 
 def test_the_lines_of_pandas_make_a_recording(folder, refusal, monkeypatch):

@@ -198,14 +198,6 @@ def test_a_topic_that_is_not_named_is_never_read(bag, imported, capsys):
     assert "skipped" not in capsys.readouterr().out
 
 
-def test_angles_across_a_gap_are_unknown(bag, imported, capsys):
-    t = np.concatenate([T[:6], T[6:] + 1.0])
-    recording = imported(bag(skin(t=t), joints()))
-    assert np.isfinite(recording.joints[:6]).all()
-    assert np.isnan(recording.joints[6:]).all()
-    assert "lacks joint angles for 6 of 12 frames" in capsys.readouterr().out
-
-
 def test_clocks_that_never_meet_are_joined_by_the_time_of_logging(
     bag,
     imported,

@@ -33,8 +33,6 @@ def rows_of(table):
     [
         PLAIN,
         PLAIN.replace("\n", "\r\n"),
-        PLAIN.replace(",", ";"),
-        PLAIN.replace(",", "\t"),
         PLAIN.replace(",", "  "),
         "t;p1;p2\n0,0;1,0;2,0\n0,01;3,0;4,0\n",
         "sep=;\n" + PLAIN.replace(",", ";"),

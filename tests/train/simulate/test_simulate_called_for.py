@@ -1,7 +1,6 @@
 """An effect that is not called for costs nothing and changes nothing."""
 
 import json
-import re
 from itertools import product
 
 import pytest
@@ -18,7 +17,6 @@ from train.simulate.plan import (
     make_plan,
     module_of,
     required_effects,
-    summary,
 )
 from train.simulate.scene import from_dict
 from train.simulate.schema import EFFECTS
@@ -162,11 +160,3 @@ def test_a_spread_around_0_calls_for_its_effect_in_movable_objects():
         sentence = f"spread.{key} .*: give a movable object {partner}"
         with pytest.raises(InputError, match=sentence):
             from_dict({"object": wall, "spread": {key: 1e-3}})
-
-
-def test_a_summary_names_the_effects_that_run_and_those_that_do_not():
-    counted, unused, *_ = summary(scene("noise"))
-    counts = dict(re.findall(r"(\w+) \((\d+)\)", counted))
-    assert counts
-    assert not set(counts) & set(unused.partition(": ")[2].split(", "))
-    assert len(counts) + len(unused.partition(": ")[2].split(", ")) == len(EFFECTS)
