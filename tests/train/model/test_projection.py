@@ -81,15 +81,6 @@ def test_the_grid_of_principal_components_does_not_depend_on_their_number(compon
     assert (few.transform(X) == many.transform(X)[:, :components]).all()
 
 
-def test_rounding_moves_a_coordinate_by_a_few_millionths_of_the_longest_row():
-    X = features(30)
-    p = Projection("none", 20).fit(X)
-    _, axes, _ = principal_axes(X)
-    true = (X - p.mean_).astype(np.longdouble) @ axes[:20].T.astype(np.longdouble)
-    longest = np.linalg.norm(X - p.mean_, axis=1).max()
-    assert float(np.abs(p.transform(X) - true).max()) < 2.0**-20 * longest
-
-
 def exact_distances(rows, labels, shrinkage):
     """Squared distances of integer rows among their discriminants, to 50 digits."""
     with mpmath.workdps(50):

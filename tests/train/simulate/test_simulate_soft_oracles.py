@@ -61,9 +61,8 @@ class TestBed:
 
 
 def layer_solution(half_width):
-    """Load, depth and mean pressure's peak of a cylinder of radius 1 on a bonded layer
-    of E = 1 and H = 1 without lateral strain, by its Green's function (Fourier),
-    half_width a."""
+    """Load and depth of a cylinder of radius 1 on a bonded layer of E = 1 and H = 1
+    without lateral strain, by its Green's function (Fourier), half_width a."""
     n = 8192
     step = 1 / 200
     w = 2.0 * np.pi * np.fft.rfftfreq(n, step)
@@ -80,30 +79,16 @@ def layer_solution(half_width):
         toeplitz(green[:points]), np.stack([np.ones(points), x * x / 2.0]).T
     ).T
     depth = curved[0] / flat[0]  # no pressure at the edge
-    pressure = depth * flat - curved
-    return pressure.sum(), depth, pressure.max() / pressure.mean()
+    return (depth * flat - curved).sum(), depth
 
 
 class TestLateral:
-    @pytest.mark.parametrize(("part", "bound"), [(0.1, 0.2), (0.6, 0.1)])
-    def test_load_and_width_are_the_elastic_layers(self, part, bound):
-        load, depth, peak = layer_solution(part)
-        # Columns so fine that the sum is the integral; E = H = R = 1.
-        x = np.linspace(0.0, 2.0, 4001)
-        gaps = x * x / 2.0 + lateral.delay(x, np.array(1.0))
-        inside = np.maximum(depth - gaps, 0.0)
-        force = 2.0 * inside.sum() * (x[1] - x[0]) + 2.0 * lateral.MARGIN * depth
-        assert force == pytest.approx(load, rel=bound)
-        assert x[inside > 0.0].max() == pytest.approx(part, rel=bound)
-        shape = np.sqrt(inside[inside > 0.0])
-        assert shape.max() / shape.mean() == pytest.approx(peak, rel=0.05)
-
     def test_the_bed_of_taxels_keeps_to_it(self):
         foam = one_object(family="foam", modulus_pa=12e3, depth_m=0.1, relax_ratio=0.0)
         batch = run(make(foam))
         depth = batch.traces["depth_m"][0, -1] / 0.1
         parts_of_depth = (0.2, 0.3, 0.4)
-        loads, depths, _ = zip(*map(layer_solution, parts_of_depth), strict=True)
+        loads, depths = zip(*map(layer_solution, parts_of_depth), strict=True)
         scale = RADIUS / 0.1
         want = np.interp(depth * scale, depths, loads) / scale
         length = batch.trials.scene.skin.pitch[0] * batch.trials.bed.weight[:, 0].sum()
