@@ -105,16 +105,7 @@ def exact_distances(rows, labels, shrinkage):
         return ((z[:, None] - z) ** 2).sum(axis=2).astype(float)
 
 
-ROWS = [
-    [3, 1, 4],
-    [1, 5, 9],
-    [2, 6, 5],
-    [3, 5, 8],
-    [9, 7, 9],
-    [3, 2, 3],
-    [8, 4, 6],
-    [2, 6, 4],
-]
+ROWS = np.random.default_rng(3).integers(1, 10, (8, 3)).tolist()
 
 
 @pytest.mark.parametrize(
