@@ -42,20 +42,6 @@ def test_the_projection_works_in_a_scikit_learn_pipeline():
         assert (copy[0].weights_ == pipe[0].weights_).all()
 
 
-def test_a_classifier_answers_every_task_by_the_rules():
-    X = features(30)
-    y = {"kind": np.repeat(["a", "b"], 15), "object": np.tile(["x", "y", "z"], 10)}
-    choices = {"kind": Choice("none", 5, 3), "object": Choice("IV", 40, 1)}
-    model = ContactClassifier(choices).fit(X, y)
-    components = {task: fitted.components for task, fitted in model.tasks_.items()}
-    assert components == {"kind": 5, "object": 29}
-    squares = model.tasks_["object"].squares(X)
-    assert (squares.argmin(axis=1) == np.arange(30)).all()
-    assert not squares.diagonal().any()
-    labels = model.decide(X)["object"].labels
-    assert (model.tasks_["object"].classes[labels] == y["object"]).all()
-
-
 def test_the_slope_makes_a_share_of_right_answers_their_log_odds():
     """At one size of gap the maximum is known: odds of 8.5 to 2.5 for 8 of 10, by half
     a trial."""

@@ -141,7 +141,7 @@ def test_discriminants_are_those_of_fifty_digits(rows, labels, shrinkage):
     assert np.abs(ours - exact).max() < 1e-9 * exact.max()
 
 
-def test_discriminants_have_a_fixed_sign_and_the_variance_one_within():
+def test_discriminants_have_a_fixed_sign():
     X = features(60)
     labels = np.repeat([0, 1, 2], 20)
     X[labels == 1, :40] += 3.0
@@ -149,13 +149,6 @@ def test_discriminants_have_a_fixed_sign_and_the_variance_one_within():
     weights = Spectrum(X).discriminants(labels, 1e-9)
     top = weights[np.abs(weights).argmax(axis=0), np.arange(2)]
     assert (top > 0).all()
-    wide = features(900, seed=3)[:, ::7]
-    labels = np.repeat([0, 1, 2], 300)
-    wide[labels == 1] += 0.1
-    z = wide @ Spectrum(wide).discriminants(labels, 1e-9)
-    means = np.array([z[labels == c].mean(axis=0) for c in range(3)])
-    within = ((z - means[labels]) ** 2).mean(axis=0)
-    assert within == pytest.approx(np.ones(z.shape[1]), rel=1e-4)
 
 
 def test_the_discriminants_of_several_tasks_stand_side_by_side():

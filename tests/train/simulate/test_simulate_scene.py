@@ -114,7 +114,6 @@ MISTAKES = [
         "object 'thing': unknown key modulus_pa; allowed: name",
     ),
     ("object.0.base_m", 0.2, "object 'thing': height_m is missing"),
-    ("object.0.cover_spread", 0.1, "object 'thing': cover_n_m is missing"),
 ]
 
 

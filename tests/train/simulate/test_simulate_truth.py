@@ -155,7 +155,6 @@ class TestFamilies:
                 "family 'crate': unknown key colour; allowed: name.*, count",
             ),
             ({"friction_kinetic": 0.2}, "unknown key friction_kinetic; "),
-            ({"base_m": 0.2}, "family 'crate': object 'crate 01': height_m is missing"),
         ],
     )
     def test_a_family_that_makes_no_sense_is_refused(self, change, says):
