@@ -113,9 +113,9 @@ def test_a_file_of_values_by_their_sensors_is_a_trial(folder):
     assert recordings["cup_1"].frames.tolist() == [[[0, 1]], [[100, 101]]]
 
 
-def test_the_lines_of_pandas_make_a_recording(folder, refusal, monkeypatch):
+def test_the_lines_of_pandas_make_a_recording(folder, refused, monkeypatch):
     put(folder, {"cup_1.csv": "t,thumb,index\n0,1,2\n0.1,3,4\n"})
-    refusal("import", "csv", folder, "--out", folder.parent / "out")
+    refused("csv", folder)
     monkeypatch.chdir(folder)
     exec(PANDAS.partition("\n")[2].replace('"s1", "s2"', '"thumb", "index"'))
     assert load("cup_1.npz").frames.tolist() == [[[1, 2]], [[3, 4]]]
@@ -261,10 +261,8 @@ RATE = ("--rate", "1")
         ),
     ],
 )
-def test_what_cannot_be_used_is_one_sentence(files, words, sentence, folder, refusal):
-    path = put(folder, files)
-    out = folder.parent / "out"
-    assert sentence in refusal("import", "csv", path, "--out", out, *words)
+def test_what_cannot_be_used_is_one_sentence(files, words, sentence, folder, refused):
+    assert sentence in refused("csv", put(folder, files), *words)
 
 
 TABLES = int(os.environ.get("TABLES", "20"))
@@ -421,14 +419,11 @@ def test_dates_that_run_within_a_trial_are_its_times(folder):
 )
 def test_a_long_table_that_contradicts_itself_is_refused(
     folder,
-    refusal,
+    refused,
     table,
     sentence,
 ):
-    path = folder / "all.csv"
-    path.write_text(table)
-    assert sentence in refusal("import", "csv", path, "--out", folder.parent / "out")
-    assert not (folder.parent / "out").exists()
+    assert sentence in refused("csv", put(folder, {"all.csv": table}))
 
 
 def test_labels_and_the_names_of_trials_stand_as_they_are(folder):
