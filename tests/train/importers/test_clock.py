@@ -25,7 +25,6 @@ def test_a_time_within_the_jitter_puts_its_frame_in_its_place():
         ([0.0, 0.1, 0.2, 0.1, 0.3], r"a.csv: its time goes back by 0.1 s at row 4"),
         ([0.0, 0.1, 0.2, 0.149, 0.3], "goes back by 0.051 s at row 4"),
         ([0.0, 0.1, 0.2, 3600.3], "its time jumps by 3600.1 s at row 4"),
-        ([0.0, 0.1, 0.1, 0.2, 0.3], "its time stands still at row 3"),
         ([0.0, 0.1, np.nan, 0.2, 0.3], "row 3 has no time"),
     ],
 )

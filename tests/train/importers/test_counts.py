@@ -132,12 +132,6 @@ def test_a_trial_that_is_unlike_most_is_refused_by_itself():
         recorded(rest, odd)
 
 
-def test_values_that_fall_keep_their_fractions():
-    touch = trial([0.5], [0.5], [0.5], [0.25])
-    rest = rest_of([touch], ValueOptions(falls=True))
-    assert recorded(rest, touch).frames.ravel().tolist() == [0, 0, 0, 25]
-
-
 def test_a_number_that_stands_for_missing_values_is_named_and_may_be_told(capsys):
     touch = trial([0, 65535], [900, 5], [-1, 7])
     rest_of([touch, trial([65534, 3]), trial([4, 3])], ValueOptions())

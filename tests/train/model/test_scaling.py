@@ -72,8 +72,7 @@ def vectors(types):
     """30 of so many feature types, with 4 samples of each."""
     rng = np.random.default_rng(0)
     scale = 10.0 ** rng.integers(-3, 4, types)
-    walks = rng.normal(size=(30, types, 4)).cumsum(axis=2)
-    return np.abs(walks * scale[:, None]).reshape(30, -1)
+    return (rng.gamma(2.0, size=(30, types, 4)) * scale[:, None]).reshape(30, -1)
 
 
 def test_method_v_brings_motion_to_the_range_of_force_and_area_wherever_it_stands():

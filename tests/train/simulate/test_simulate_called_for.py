@@ -69,12 +69,6 @@ def test_an_effect_not_called_for_is_not_loaded():
     assert json.loads(python("-c", program).stdout) == ["train.simulate.effects.base"]
 
 
-def modules_of(effects):
-    """The modules of a trial's effects, in the order in which their hooks run."""
-    shared = ("viscous",) if {"relaxation", "inertia"} & set(effects) else ()
-    return ("base", *shared, *effects)
-
-
 def test_adding_an_effect_leaves_the_others_draws():
     trial_scene = scene("noise")
     other_scene = scene("noise", "dead_taxels", "drift", "dropped_frames", "tilt")
@@ -98,7 +92,9 @@ def plan():
 
 def owners_of(effects, stage):
     """The modules whose hooks a trial of these effects runs in a stage, in order."""
-    have = [n for n in modules_of(effects) if hasattr(module_of(n), stage)]
+    shared = ("viscous",) if {"relaxation", "inertia"} & set(effects) else ()
+    names = ("base", *shared, *effects)
+    have = [n for n in names if hasattr(module_of(n), stage)]
     return have[-1:] if stage in INSTEAD else have
 
 

@@ -29,7 +29,7 @@ from train.report.work import Workers
 from train.tradeoff import answer, board, choices, costs, early
 from train.tradeoff import run as running
 from train.tradeoff.choices import chosen as make_choice
-from train.tradeoff.choices import followed, unseen
+from train.tradeoff.choices import followed
 from train.tradeoff.front import ParetoFront
 from train.tradeoff.run import Options
 
@@ -61,11 +61,6 @@ def test_windows_are_measured_where_the_curve_is_steep(monkeypatch):
     points = choices.choices_at(None, list(right), "t", workers, quick=True)
     assert list(points) == [0.2, 0.6, 0.8, 0.9, 1.0, 1.2]
     assert made == [0.2, 0.6, 1.2, 0.9, 0.8, 1.0]
-
-
-def test_unseen_objects_have_a_figure_only_where_they_were_left_out():
-    assert unseen(chosen(50)) is None
-    assert unseen(chosen(60, 50)).accuracy == 0.5
 
 
 @pytest.fixture(scope="module")
@@ -216,23 +211,15 @@ def test_the_cheapest_use_may_be_early_and_its_price_has_an_interval():
     assert "run --model build/model.onnx --error 0.1" in row["command"]
 
 
-def comparison(right, seconds=(0.2, 0.6, 1.0)):
-    """Fixed windows with these outcomes; every confidence is a half."""
-    right = np.array(right, dtype=bool)
-    confidence = np.full(right.shape, 0.5)
-    course = Course([confidence], [~right], np.zeros(right.shape, dtype=bool))
-    return early.StoppingComparison(seconds, right, confidence, course, [])
-
-
-def share_right(*shares):
-    """(windows, 100) of which so many are right."""
-    return np.arange(100) < 100 * np.array(shares)[:, None]
-
-
 class TestEarly:
     def test_a_calibrated_confidence_has_no_calibration_error(self):
-        for share, error in ((0.5, 0.0), (0.9, 0.4)):
-            compared = comparison(share_right(share, share, share))
+        """Every confidence is a half."""
+        half = np.full((3, 100), 0.5)
+        for percent, error in ((50, 0.0), (90, 0.4)):
+            right = np.tile(np.arange(100) < percent, (3, 1))
+            course = Course([half], [~right], np.zeros_like(right))
+            seconds = (0.2, 0.6, 1.0)
+            compared = early.StoppingComparison(seconds, right, half, course, [])
             assert compared.calibration_error == pytest.approx(error)
 
     def test_early_decisions_follow_the_rules_that_the_model_of_all_contacts_certifies(
