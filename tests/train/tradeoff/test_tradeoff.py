@@ -2,7 +2,7 @@
 
 import argparse
 import json
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from types import SimpleNamespace
@@ -305,18 +305,6 @@ def test_a_board_file_of_another_model_is_one_sentence(recordings, tmp_path, ref
     assert not any((tmp_path / "out").iterdir())
 
 
-@dataclass(frozen=True)
-class Written:
-    """A report that was written, and the digest of its recordings."""
-
-    report: Path
-    digest: str
-
-    @property
-    def text(self):
-        return self.report.read_text()
-
-
 def quickly(change, like, answered=costs.answered):
     """A change with a quick choice, even where that among all candidates is asked
     for."""
@@ -325,7 +313,8 @@ def quickly(change, like, answered=costs.answered):
 
 @pytest.fixture(scope="module")
 def written(tmp_path_factory):
-    """The report on 28 touches, with few windows and changes."""
+    """The report on 28 touches, its text, and the digest of its recordings, with few
+    windows and changes."""
     folder = tmp_path_factory.mktemp("tradeoff")
     data = str(save_touches(folder / "data", 14, rate=25.0))
     single = part(load(folder / "data" / "hard_00.npz"), slice(1))
@@ -344,7 +333,7 @@ def written(tmp_path_factory):
         patch.setattr(costs, "EVERY", ())
         patch.setattr(costs, "coarser", lambda *_: [])
         report = running.tradeoff([data], folder / "out", str(path), options)
-    return Written(report, digest)
+    return SimpleNamespace(report=report, text=report.read_text(), digest=digest)
 
 
 def test_the_report_needs_no_other_page(written):
