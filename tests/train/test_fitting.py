@@ -12,12 +12,10 @@ PAPER = {"features": ["paper"], "projection": "pca", "scaling": "IV", "jobs": 1}
 """Few candidates."""
 
 
-@pytest.fixture(scope="module")
-def fitted(recordings):
-    return train.fit(str(recordings), quick=True, jobs=1)
-
-
-def test_each_task_has_its_own_choice_and_the_model_measures_what_they_take(fitted):
+def test_each_task_has_its_own_choice_and_the_model_measures_what_they_take(
+    recordings,
+):
+    fitted = train.fit(str(recordings), quick=True, jobs=1)
     assert set(fitted.chosen) == {"category", "object"}
     assert fitted.chosen["category"].accuracy.right == 16
     features = {

@@ -15,14 +15,6 @@ from train.draw.recording import draw
 TOUCH = demo.recordings()[0]
 
 
-@pytest.fixture(scope="module")
-def plain(tmp_path_factory):
-    """The picture of a touch."""
-    out = tmp_path_factory.mktemp("picture") / "plain.png"
-    assert main(["show", str(TOUCH), "--out", str(out)]) == 0
-    return out
-
-
 @pytest.mark.parametrize("beside", [[], [str(TOUCH)]])
 def test_a_label_with_dollar_signs_is_no_formula(tmp_path, beside):
     touch = load(TOUCH)
@@ -31,7 +23,9 @@ def test_a_label_with_dollar_signs_is_no_formula(tmp_path, beside):
     assert main(["show", str(tmp_path / "a.npz"), *beside]) == 0
 
 
-def test_shear_adds_arrows(plain, tmp_path):
+def test_shear_adds_arrows(tmp_path):
+    plain = tmp_path / "plain.png"
+    assert main(["show", str(TOUCH), "--out", str(plain)]) == 0
     draw(sheared(load(TOUCH)), tmp_path / "arrows.png")
     without, arrows = (imread(path) for path in (plain, tmp_path / "arrows.png"))
     assert without.shape == arrows.shape

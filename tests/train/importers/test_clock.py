@@ -7,12 +7,6 @@ from edge.errors import InputError
 from train.importers.clock import angles_at, order
 
 
-def test_times_that_increase_are_left_alone():
-    result = order(np.array([0.0, 0.1, 0.2]), "a.csv")
-    assert result.kept.tolist() == [0, 1, 2]
-    assert result.text == ""
-
-
 def test_a_time_within_the_jitter_puts_its_frame_in_its_place():
     result = order(np.array([0.0, 0.1, 0.2, 0.16, 0.3]), "a.csv")
     assert result.kept.tolist() == [0, 1, 3, 2, 4]
