@@ -117,11 +117,13 @@ def hits(agreeing):
     return right
 
 
+NONE_RIGHT = Promise(0, 60, hits=np.zeros(60, dtype=bool))
+
+
 def test_tasks_that_agree_are_scored_as_they_are_decided_together(agreeing, hits):
     vectors, choices, folds = agreeing
-    none_right = Promise(0, 60, hits=np.zeros(60, dtype=bool))
     chosen = {
-        task: Chosen(choice, none_right, none_right, "trial")
+        task: Chosen(choice, NONE_RIGHT, NONE_RIGHT, "trial")
         for task, choice in choices.items()
     }
     plans = {"trial": (folds, [choices] * 5)}
@@ -135,8 +137,7 @@ def test_tasks_that_agree_are_scored_as_they_are_decided_together(agreeing, hits
 def test_a_task_with_groups_is_scored_by_single_trials_too(agreeing, hits):
     vectors, choices, folds = agreeing
     mobility = replace(vectors, y={"mobility": vectors.y["mobility"]})
-    none_right = Promise(0, 60, hits=np.zeros(60, dtype=bool))
-    chosen = {"mobility": Chosen(choices["mobility"], none_right, none_right, "object")}
+    chosen = {"mobility": Chosen(choices["mobility"], NONE_RIGHT, NONE_RIGHT, "object")}
     plans = {left_out: (folds, [choices] * 5) for left_out in ("trial", "object")}
     settings = decided_together(chosen, mobility, plans)["mobility"]
     assert settings.by_trial.right == hits["mobility alone"].sum()

@@ -58,8 +58,8 @@ class TestSureDecisions:
         assert decided.error(np.array([0.6]), np.array([True, False])) == 0.0
 
 
-def early_settings(make_touch, folder, arm, k):
-    """The settings before the full window, where those of the full window take k
+def early_settings(make_touch, folder, arm):
+    """The settings before the full window, where those of the full window take 3
     neighbours."""
     for kind, seed in product(("hard", "soft"), range(5)):
         touch = make_touch(kind=kind, seed=seed, arm=arm, labels={"softness": kind})
@@ -69,14 +69,14 @@ def early_settings(make_touch, folder, arm, k):
     dataset = load_trials([folder], Measurement(features_of(early)))
     y = {"softness": dataset.labels("softness")}
     choosing = Choosing(dataset, y, early, Divisions.of(dataset, y), samples=10)
-    full = Choice("IV", 1, k, features=early[0].grids[0].features)
+    full = Choice("IV", 1, 3, features=early[0].grids[0].features)
     return choosing.early(1.2, {"softness": SimpleNamespace(choice=full)})
 
 
 def test_decision_points_before_the_full_window_have_settings_where_joints_are_known(
     make_touch, tmp_path
 ):
-    early = early_settings(make_touch, tmp_path, arm=True, k=3)
+    early = early_settings(make_touch, tmp_path, arm=True)
     assert early.choices["softness"].projection == "lda"
     assert len(early.by_fold) == 10
     # The number of neighbours is that of the full window, as the graph has one.
@@ -84,7 +84,7 @@ def test_decision_points_before_the_full_window_have_settings_where_joints_are_k
 
 
 def test_without_joints_they_have_the_settings_of_the_full_window(make_touch, tmp_path):
-    assert early_settings(make_touch, tmp_path, arm=False, k=3) is None
+    assert early_settings(make_touch, tmp_path, arm=False) is None
 
 
 def test_the_discriminants_of_all_tasks_serve_each_where_there_are_several():

@@ -81,18 +81,11 @@ def test_trials_that_are_equal_tie_as_in_the_exported_estimators(seed):
         assert_exported(table, fold, vectors, folds != fold, folds == fold)
 
 
-@pytest.fixture
-def partly_labelled():
-    """Trials of which some have no label and others no fold, and their folds."""
+def test_trials_without_a_label_or_a_fold_are_not_tested():
     vectors = trials()
-    y = vectors.y["t"]
-    y[::5] = ""
-    numbers = np.arange(len(y))
-    return vectors, np.where(numbers % 2 == 0, numbers // 2 % 3, -1)
-
-
-def test_trials_without_a_label_or_a_fold_are_not_tested(partly_labelled):
-    vectors, folds = partly_labelled
+    vectors.y["t"][::5] = ""
+    numbers = np.arange(36)
+    folds = np.where(numbers % 2 == 0, numbers // 2 % 3, -1)
     table = evaluate(vectors, folds, GRIDS)
     tested = (folds >= 0) & (vectors.y["t"] != "")
     assert (table.tested["t"] == tested).all()

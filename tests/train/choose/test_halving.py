@@ -5,7 +5,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tests.train.choose.test_evaluate import told_right
 from train.choose.evaluate import evaluate
 from train.choose.halving import fold_pairs, folds_near, rungs
 from train.choose.rule import Rule
@@ -59,16 +58,6 @@ def test_a_grid_that_is_dropped_is_fitted_no_further(vectors):
     assert not table.right["t"][0][4:, FOLDS == 5].any()
     assert table.nested("t", 0)[:2].mean() > 0.9
     assert not table.nested("t", 0)[4:].any()
-
-
-def test_the_answers_of_those_that_run_are_those_of_the_exported_estimators(vectors):
-    table = evaluate(vectors, FOLDS, GRIDS, halve=by_price)
-    choice = table.choices["t"][0]
-    for fold, other in ((0, 1), (0, 5), (4, 4)):
-        tested = other == FOLDS
-        train = (fold != FOLDS) & ~tested
-        right = told_right(choice, vectors, train, tested)
-        assert (table.right["t"][fold][0, tested] == right).all()
 
 
 def test_what_is_dropped_without_a_fold_does_not_depend_on_its_labels(vectors):

@@ -5,20 +5,7 @@ import pytest
 
 from train.choose.search import MANY, Decomposition, SearchGrid, clearness, nearest
 
-ROWS = np.array(
-    [[0.0, 2.0], [0.0, -2.0], [3.0, 0.0], [-3.0, 0.0], [3.0, 0.0], [-3.0, 0.0]]
-)
 LABELS = {"t": np.array([0, 0, 1, 2, 1, 2])}
-
-
-def test_the_nearest_come_first_and_equally_near_ones_in_their_order():
-    grid = SearchGrid(components=(1, 2), neighbours=(5,))
-    new = np.array([[2.0, 0.0], [0.0, 1.0]])
-    near = nearest(Decomposition(ROWS, new, LABELS).spaces(grid, "t"), 5)
-    assert near.shape == (2, 2, 5)
-    # Along the first axis, then in the plane.
-    assert near[0, 0].tolist() == [2, 4, 0, 1, 3]
-    assert near[1].tolist() == [[2, 4, 0, 1, 3], [0, 1, 2, 3, 4]]
 
 
 def test_rows_that_never_differ_are_all_equally_near():

@@ -2,19 +2,15 @@
 values."""
 
 import math
-from fractions import Fraction
 from itertools import pairwise
 
-import mpmath
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
 from edge.errors import InputError
 from edge.touch.features import FEATURES, feature_vector, widths
 from edge.touch.layout import SkinLayout
-from edge.touch.measures import TRANSFORMS, feature
+from edge.touch.measures import feature
 from tests.edge.touch.pressed import followed, pressed
 from train.data.feature_sets import SETS, expand, unit
 
@@ -244,30 +240,3 @@ def test_angles_that_do_not_suit_are_one_sentence(angle, joints, sentence):
     angles[3, 1] = angle
     with pytest.raises(InputError, match=sentence):
         series_of(touch(PEAKS, joints=angles), ["joint_change"], joints=joints)
-
-
-def exactly(transform, forces):
-    """The transformed forces of fractions of a newton, to 40 digits."""
-    with mpmath.workdps(40):
-        exact = [mpmath.mpf(force.numerator) / force.denominator for force in forces]
-        transformed = {
-            "log": lambda force: mpmath.log(force + mpmath.mpf(1) / 10),
-            "sqrt": mpmath.sqrt,
-            "relative": lambda force: force / max(exact),
-        }[transform]
-        return [float(transformed(force)) for force in exact]
-
-
-@settings(max_examples=30)
-@given(
-    peaks=st.lists(st.integers(10, 65535), min_size=5, max_size=5),
-    transform=st.sampled_from(TRANSFORMS),
-)
-def test_transforms_are_within_four_roundings_of_exact_arithmetic(peaks, transform):
-    vector = vector_of(touch(peaks), f"{transform}_skin_force")
-    halves = [peak // 2 if peak // 2 > SKIN.threshold_counts else 0 for peak in peaks]
-    forces = [Fraction(p + half, 100) for p, half in zip(peaks, halves, strict=True)]
-    roundings = 4 * 2.0**-53
-    # A logarithm near 0 keeps the rounding of its argument.
-    rest = roundings if transform == "log" else 0
-    assert vector == pytest.approx(exactly(transform, forces), rel=roundings, abs=rest)

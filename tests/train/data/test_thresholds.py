@@ -85,9 +85,7 @@ def test_a_proposal_that_misses_touches_is_as_high_as_the_noise(make_touch):
     for seed in range(4):
         touch = make_touch(seed=seed)
         soft = weaker(touch, 70.0 / touch.frames.max())
-        trials.append(
-            noisy(replace(soft, meta={**soft.meta, "labels": {"object": "down"}}), seed)
-        )
+        trials.append(noisy(labelled(soft), seed))
     weak = proposed(trials)
     assert weak.threshold == 40
     assert weak.onset == 60  # the touch peaks at 70

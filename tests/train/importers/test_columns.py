@@ -88,7 +88,6 @@ def test_columns_are_named_by_names_ranges_and_places(terms, names):
         ({"taxels": "s3"}, r"a.csv: has no column s3; it has \['s1', 's2'\]"),
         ({"taxels": "s1,s1"}, "named twice"),
         ({"taxels": "s1-s2", "joints": "s2"}, "both as a taxel and as time or joint"),
-        ({"joints": "s1,s2"}, "no columns are named as taxels"),
         ({"time": "s1,s2"}, "--time names several columns"),
     ],
 )

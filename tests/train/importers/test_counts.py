@@ -78,23 +78,13 @@ def test_signed_values_count_their_distance_with_all_their_digits():
     assert counted.meta["values"] == values
 
 
-@pytest.fixture
-def sheared():
-    """A trial of one taxel whose shear is 3 and -4 at rest."""
+def test_shear_loses_its_rest_where_the_normal_does():
+    """A taxel whose shear is 3 and -4 at rest."""
     shear = np.full((4, 1, 2), [3.0, -4.0])
     shear[3] = [5.0, -10.0]
-    return trial([1], [1], [1], [2], shear=shear)
-
-
-def test_shear_loses_its_rest_where_the_normal_does(sheared):
-    counted = signed(sheared)
+    counted = signed(trial([1], [1], [1], [2], shear=shear))
     assert counted.shear[3].tolist() == [[[2, -6]]]
     assert counted.meta["skin"]["axes"] == 3
-
-
-def test_shear_stands_where_the_normal_does(sheared):
-    counted = recorded(rest_of([sheared], ValueOptions()), sheared)
-    assert counted.shear[3].tolist() == [[[5, -10]]]
 
 
 @pytest.mark.parametrize("unknown", [NAN, np.inf])
@@ -142,12 +132,6 @@ def test_a_trial_that_is_unlike_most_is_refused_by_itself():
         recorded(rest, odd)
 
 
-def test_values_that_fall_keep_their_fractions():
-    touch = trial([0.5], [0.5], [0.5], [0.25])
-    rest = rest_of([touch], ValueOptions(falls=True))
-    assert recorded(rest, touch).frames.ravel().tolist() == [0, 0, 0, 25]
-
-
 def test_a_number_that_stands_for_missing_values_is_named_and_may_be_told(capsys):
     touch = trial([0, 65535], [900, 5], [-1, 7])
     rest_of([touch, trial([65534, 3]), trial([4, 3])], ValueOptions())
@@ -157,10 +141,6 @@ def test_a_number_that_stands_for_missing_values_is_named_and_may_be_told(capsys
     assert "1 value of 65535 stand alone" in capsys.readouterr().out
     rest_of([touch], ValueOptions(missing=65535.0))
     assert np.isnan(touch.values[..., 0]).tolist() == [[False, True], [False, False]]
-
-
-def test_a_shape_is_rows_and_columns():
-    assert shape_of_skin("16x24") == (16, 24)
 
 
 @pytest.mark.parametrize("text", ["16", "axb", f"{'1' * 5000}x2", "²x2"])

@@ -26,13 +26,8 @@ def text(rows, mark=",", head="") -> str:
     return "\n".join([*([head] if head else []), *lines]) + "\n"
 
 
-def wide_with_a_header(folder):
-    (folder / "cup 3.csv").write_text(text(WIDE, head="time,a,b,c,d,e,f"))
-    return ["--taxels", "a-f"]
-
-
 def numbers_alone(folder):
-    (folder / "cup_3.txt").write_text(text(WIDE, "  "))
+    (folder / "cup 3.txt").write_text(text(WIDE, "  "))
     return ["--time", "1"]
 
 
@@ -93,7 +88,6 @@ def imported(folder, *words):
 @pytest.mark.parametrize(
     "form",
     [
-        wide_with_a_header,
         numbers_alone,
         an_array,
         a_matlab_file,
@@ -119,19 +113,9 @@ def test_a_file_of_values_by_their_sensors_is_a_trial(folder):
     assert recordings["cup_1"].frames.tolist() == [[[0, 1]], [[100, 101]]]
 
 
-def test_a_set_that_lacks_a_scale_is_refused_and_nothing_is_written(folder, refusal):
-    files = {f"{i}.txt": f"0 0\n0.{i} 0\n" for i in range(5)}
-    put(folder, files)
-    out = folder.parent / "out"
-    message = refusal("import", "csv", folder, "--out", out, *RATE)
-    assert "1.txt: 0 to 0.1 are no counts" in message
-    assert "add --scale 10, or see" in message
-    assert not list(out.glob("*"))
-
-
-def test_the_lines_of_pandas_make_a_recording(folder, refusal, monkeypatch):
+def test_the_lines_of_pandas_make_a_recording(folder, refused, monkeypatch):
     put(folder, {"cup_1.csv": "t,thumb,index\n0,1,2\n0.1,3,4\n"})
-    refusal("import", "csv", folder, "--out", folder.parent / "out")
+    refused("csv", folder)
     monkeypatch.chdir(folder)
     exec(PANDAS.partition("\n")[2].replace('"s1", "s2"', '"thumb", "index"'))
     assert load("cup_1.npz").frames.tolist() == [[[1, 2]], [[3, 4]]]
@@ -277,10 +261,8 @@ RATE = ("--rate", "1")
         ),
     ],
 )
-def test_what_cannot_be_used_is_one_sentence(files, words, sentence, folder, refusal):
-    path = put(folder, files)
-    out = folder.parent / "out"
-    assert sentence in refusal("import", "csv", path, "--out", out, *words)
+def test_what_cannot_be_used_is_one_sentence(files, words, sentence, folder, refused):
+    assert sentence in refused("csv", put(folder, files), *words)
 
 
 TABLES = int(os.environ.get("TABLES", "20"))
@@ -437,14 +419,11 @@ def test_dates_that_run_within_a_trial_are_its_times(folder):
 )
 def test_a_long_table_that_contradicts_itself_is_refused(
     folder,
-    refusal,
+    refused,
     table,
     sentence,
 ):
-    path = folder / "all.csv"
-    path.write_text(table)
-    assert sentence in refusal("import", "csv", path, "--out", folder.parent / "out")
-    assert not (folder.parent / "out").exists()
+    assert sentence in refused("csv", put(folder, {"all.csv": table}))
 
 
 def test_labels_and_the_names_of_trials_stand_as_they_are(folder):

@@ -117,9 +117,9 @@ def test_joint_angles_are_interpolated_in_radians_and_unknown_far_from_them(tmp_
         (dsa(angles=[(40, [0.0] * 7), (0, [0.0] * 7)]), "goes back"),
     ],
 )
-def test_a_damaged_file_is_one_sentence_that_names_it(content, word, tmp_path, refusal):
+def test_a_damaged_file_is_one_sentence_that_names_it(content, word, tmp_path, refused):
     file = written(tmp_path, content)
-    message = refusal("import", "sdh2", tmp_path, "--out", tmp_path / "out")
+    message = refused("sdh2", tmp_path)
     assert word in message
     assert "cup" in message
     assert file.exists()

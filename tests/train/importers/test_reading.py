@@ -11,7 +11,7 @@ import pytest
 
 from edge.errors import InputError
 from train.importers import reading
-from train.importers.reading import read_frame, read_parquet, read_text
+from train.importers.reading import read_parquet, read_text
 from train.importers.tables import numbers_of
 
 PLAIN = "t,p1,p2\n0,1,2\n0.01,3,4\n"
@@ -33,8 +33,6 @@ def rows_of(table):
     [
         PLAIN,
         PLAIN.replace("\n", "\r\n"),
-        PLAIN.replace(",", ";"),
-        PLAIN.replace(",", "\t"),
         PLAIN.replace(",", "  "),
         "t;p1;p2\n0,0;1,0;2,0\n0,01;3,0;4,0\n",
         "sep=;\n" + PLAIN.replace(",", ";"),
@@ -110,10 +108,6 @@ def test_points_for_thousands_are_refused(tmp_path):
         read_text(path)
 
 
-def test_an_empty_cell_is_missing(tmp_path):
-    assert np.isnan(rows_of(read(tmp_path, "t,p1\n0,\n1,2\n"))[0][1])
-
-
 @pytest.mark.parametrize(
     ("content", "sentence"),
     [
@@ -136,12 +130,6 @@ def test_lines_count_comments_blank_lines_and_lines_within_a_cell(tmp_path):
     table = read(tmp_path, '# me\n\nt,note,p1\n0,"a\nb",1\n\n# a pause\n1,c,off\n')
     assert table.data.index.tolist() == [5, 8]
     assert table.data.index.name == "line"
-
-
-def test_a_frame_has_no_header(tmp_path):
-    path = tmp_path / "0.csv"
-    path.write_text("0,1,2\n3,4,5\n")
-    assert read_frame(path).tolist() == [[0, 1, 2], [3, 4, 5]]
 
 
 def test_the_index_of_a_parquet_table_is_a_column(tmp_path):

@@ -56,18 +56,6 @@ def test_without_novel_trials_the_odds_fall_as_assumed():
     assert curve.doubt == pytest.approx(DOUBT)
 
 
-def test_the_unit_of_the_distances_does_not_matter():
-    rng = np.random.default_rng(2)
-    margins = rng.normal(size=60)
-    right = rng.random(60) < 0.8
-    excess = np.zeros(60)
-    in_metres = Curve.of(margins, excess, right)
-    in_microns = Curve.of(1e-6 * margins, excess, right)
-    assert in_metres.probabilities(margins, excess) == pytest.approx(
-        in_microns.probabilities(1e-6 * margins, excess)
-    )
-
-
 @pytest.mark.parametrize("share", [0.0, 0.3, 0.9])
 def test_the_mean_probability_is_moved_to_a_share_even_far_away(share):
     rng = np.random.default_rng(4)

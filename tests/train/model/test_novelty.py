@@ -165,15 +165,6 @@ def test_held_out_scores_do_not_depend_on_the_held_out_trials():
     assert scores.part(~training).remoteness.tolist() == expected.remoteness.tolist()
 
 
-def test_trials_without_a_fold_have_no_score():
-    X, labels = trials(40)
-    folds = stratified_folds(labels, 5)
-    folds[:4] = -1
-    scores = held_out_scores(X, labels, folds, WIDTHS)
-    assert np.isnan(scores.novelty[:, :4]).all()
-    assert np.isfinite(scores.remoteness[:, 4:]).all()
-
-
 def test_a_new_score_of_any_small_set_lies_beyond_its_limit_as_often_as_asked():
     """Without what few scores leave open, it would be a fifth more."""
     scores = np.exp(np.random.default_rng(0).exponential(size=(4000, 100)))

@@ -31,18 +31,6 @@ def test_a_twentieth_of_a_labels_trials_stand_for_it_but_three_if_there_are():
     assert nearest_of_label(sizes).tolist() == [0, 2, 3, 3, 4, 5]
 
 
-def test_equal_distances_go_to_the_earlier_row():
-    rows = np.array([[-1.0], [1.0], [-1.0], [3.0]])
-    y = {"t": np.array(["d", "c", "b", "a"])}
-    for k in (1, 2, 3):
-        model = ContactClassifier({"t": Choice("none", 1, k)}, ["max_force"]).fit(
-            rows, y
-        )
-        assert model.tasks_["t"].classes[
-            model.decide(np.array([[0.0]]))["t"].labels
-        ] == ["d"]
-
-
 def test_the_projection_works_in_a_scikit_learn_pipeline():
     X = features(30)
     y = np.repeat(["a", "b"], 15)
@@ -52,20 +40,6 @@ def test_the_projection_works_in_a_scikit_learn_pipeline():
         assert cross_val_score(pipe, X, y, cv=5).shape == (5,)
         copy = clone(pipe).fit(X, y)
         assert (copy[0].weights_ == pipe[0].weights_).all()
-
-
-def test_a_classifier_answers_every_task_by_the_rules():
-    X = features(30)
-    y = {"kind": np.repeat(["a", "b"], 15), "object": np.tile(["x", "y", "z"], 10)}
-    choices = {"kind": Choice("none", 5, 3), "object": Choice("IV", 40, 1)}
-    model = ContactClassifier(choices).fit(X, y)
-    components = {task: fitted.components for task, fitted in model.tasks_.items()}
-    assert components == {"kind": 5, "object": 29}
-    squares = model.tasks_["object"].squares(X)
-    assert (squares.argmin(axis=1) == np.arange(30)).all()
-    assert not squares.diagonal().any()
-    labels = model.decide(X)["object"].labels
-    assert (model.tasks_["object"].classes[labels] == y["object"]).all()
 
 
 def test_the_slope_makes_a_share_of_right_answers_their_log_odds():

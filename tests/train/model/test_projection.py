@@ -3,14 +3,11 @@
 import mpmath
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
 from edge.errors import InputError
 from tests.hard_cases import exact
 from tests.hard_cases.models import features
 from train.model.projection import Projection, Spectrum, coordinate_bits, principal_axes
-from train.model.scaling import SCALINGS
 
 
 def test_components_match_long_double_and_have_a_fixed_sign():
@@ -53,28 +50,6 @@ def test_components_stop_at_the_rank():
     assert Projection().fit(rank_two).rank_ == 2
 
 
-@settings(max_examples=25)
-@given(
-    seed=st.integers(0, 100),
-    scaling=st.sampled_from(SCALINGS),
-    offset=st.sampled_from([0.0, 1e3, 1e6]),
-    spread=st.sampled_from([1e-6, 1.0, 1e6]),
-)
-def test_coordinates_are_those_of_whole_numbers_in_any_order(
-    seed,
-    scaling,
-    offset,
-    spread,
-):
-    X = features(30, seed) * spread + offset
-    p = Projection(scaling, 4).fit(X)
-    z = p.transform(X)
-    assert (z / p.grid_.unit).tolist() == exact.coordinates(X, p, 4).tolist()
-    d = (X - p.mean_) * p.gain_
-    order = np.random.default_rng(seed).permutation(120)
-    assert (p.grid_.project(d[:, order], p.weights_[order]) == z).all()
-
-
 @pytest.mark.parametrize("kind", ["pca", "lda"])
 @pytest.mark.parametrize("columns", [1, 3, 4096])
 def test_sums_of_products_stay_below_2_to_the_53(kind, columns):
@@ -106,15 +81,6 @@ def test_the_grid_of_principal_components_does_not_depend_on_their_number(compon
     assert (few.transform(X) == many.transform(X)[:, :components]).all()
 
 
-def test_rounding_moves_a_coordinate_by_a_few_millionths_of_the_longest_row():
-    X = features(30)
-    p = Projection("none", 20).fit(X)
-    _, axes, _ = principal_axes(X)
-    true = (X - p.mean_).astype(np.longdouble) @ axes[:20].T.astype(np.longdouble)
-    longest = np.linalg.norm(X - p.mean_, axis=1).max()
-    assert float(np.abs(p.transform(X) - true).max()) < 2.0**-20 * longest
-
-
 def exact_distances(rows, labels, shrinkage):
     """Squared distances of integer rows among their discriminants, to 50 digits."""
     with mpmath.workdps(50):
@@ -139,16 +105,7 @@ def exact_distances(rows, labels, shrinkage):
         return ((z[:, None] - z) ** 2).sum(axis=2).astype(float)
 
 
-ROWS = [
-    [3, 1, 4],
-    [1, 5, 9],
-    [2, 6, 5],
-    [3, 5, 8],
-    [9, 7, 9],
-    [3, 2, 3],
-    [8, 4, 6],
-    [2, 6, 4],
-]
+ROWS = np.random.default_rng(3).integers(1, 10, (8, 3)).tolist()
 
 
 @pytest.mark.parametrize(
@@ -184,7 +141,7 @@ def test_discriminants_are_those_of_fifty_digits(rows, labels, shrinkage):
     assert np.abs(ours - exact).max() < 1e-9 * exact.max()
 
 
-def test_discriminants_have_a_fixed_sign_and_the_variance_one_within():
+def test_discriminants_have_a_fixed_sign():
     X = features(60)
     labels = np.repeat([0, 1, 2], 20)
     X[labels == 1, :40] += 3.0
@@ -192,13 +149,6 @@ def test_discriminants_have_a_fixed_sign_and_the_variance_one_within():
     weights = Spectrum(X).discriminants(labels, 1e-9)
     top = weights[np.abs(weights).argmax(axis=0), np.arange(2)]
     assert (top > 0).all()
-    wide = features(900, seed=3)[:, ::7]
-    labels = np.repeat([0, 1, 2], 300)
-    wide[labels == 1] += 0.1
-    z = wide @ Spectrum(wide).discriminants(labels, 1e-9)
-    means = np.array([z[labels == c].mean(axis=0) for c in range(3)])
-    within = ((z - means[labels]) ** 2).mean(axis=0)
-    assert within == pytest.approx(np.ones(z.shape[1]), rel=1e-4)
 
 
 def test_the_discriminants_of_several_tasks_stand_side_by_side():

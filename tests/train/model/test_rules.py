@@ -62,13 +62,6 @@ def drawn(n, rng):
     return confidence, right
 
 
-def test_the_first_rule_is_the_full_window_at_the_whole_level():
-    confidence, right = drawn(140, np.random.default_rng(1))
-    rules = certify(course(confidence, ~right), SECONDS)
-    wrong = int((~right[-1]).sum())
-    assert rules[0].error == pytest.approx(upper_limit(wrong, 140, TEST_SHARE * RISK))
-
-
 def test_a_rule_is_certified_no_lower_than_those_tested_before_it():
     """Right answers at the first decision point count for nothing once the full window,
     which is tested first, has 20 of 100 wrong."""

@@ -58,14 +58,6 @@ def test_features_whose_squares_or_differences_vanish_or_overflow_are_refused():
             Projection("none", 2).fit(X)
 
 
-@pytest.mark.parametrize("scale", [1e-165, 1e306])
-def test_method_iv_standardises_at_any_scale(scale):
-    """Squares of such features vanish, or leave float64."""
-    X = np.abs(np.random.default_rng(0).normal(size=(60, 120)))
-    usual, far = (Projection("IV", 5).fit(v).transform(v) for v in (X, X * scale))
-    assert far == pytest.approx(usual, rel=1e-3, abs=1e-3)
-
-
 SIX = (
     "skin_force",
     "contact_motion",
@@ -80,8 +72,7 @@ def vectors(types):
     """30 of so many feature types, with 4 samples of each."""
     rng = np.random.default_rng(0)
     scale = 10.0 ** rng.integers(-3, 4, types)
-    walks = rng.normal(size=(30, types, 4)).cumsum(axis=2)
-    return np.abs(walks * scale[:, None]).reshape(30, -1)
+    return (rng.gamma(2.0, size=(30, types, 4)) * scale[:, None]).reshape(30, -1)
 
 
 def test_method_v_brings_motion_to_the_range_of_force_and_area_wherever_it_stands():

@@ -12,7 +12,6 @@ from train.data.folds import stratified_folds
 from train.model.held_out import answers
 from train.model.pipeline import Choice
 from train.model.stopping import (
-    Early,
     SequentialClassifier,
     excess_of,
 )
@@ -25,15 +24,12 @@ def of_neighbours(k):
     return {"t": Choice("none", 3, k)}
 
 
-def calibrated(choices, X, y):
-    """A model whose settings serve every fold too."""
-    folds = stratified_folds(next(iter(y.values())))
-    return SequentialClassifier(choices, SECONDS, ("max_force",)).fit(
-        X,
-        y,
-        folds,
-        [choices] * 10,
-    )
+def calibrated(choices, X, y, folds=None, without=None):
+    """A model whose settings serve every fold too, unless there are others."""
+    if folds is None:
+        folds = stratified_folds(next(iter(y.values())))
+    model = SequentialClassifier(choices, SECONDS, ("max_force",))
+    return model.fit(X, y, folds, without or [choices] * 10)
 
 
 def touches(n, seed=0):
@@ -53,12 +49,6 @@ def test_what_is_plain_from_the_second_decision_point_on_is_decided_there():
     new, truth = touches(300, seed=1)
     named, _ = answers(model.decision_points_, new)["t"]
     assert (named[1:] == truth).all()
-
-
-def test_points_before_the_full_window_have_settings_of_their_own():
-    full, first = map(of_neighbours, (1, 2))
-    model = SequentialClassifier(full, SECONDS, early=Early(first, []))
-    assert model.choices_at == [first, first, full]
 
 
 def test_an_excess_is_that_above_half_of_the_trials():
@@ -117,8 +107,8 @@ def test_each_fold_is_answered_by_what_was_chosen_without_it():
     choices = of_neighbours(3)
     bad = {"t": Choice("none", 1, 59 - int((folds == 0).sum()))}
     without = [bad, *[choices] * 9]
-    model = SequentialClassifier(choices, SECONDS, ("max_force",))
-    right = model.fit(X, {"t": labels}, folds, without).right_["t"][-1]
+    model = calibrated(choices, X, {"t": labels}, folds, without)
+    right = model.right_["t"][-1]
     assert right[folds != 0].all()
     assert not right[folds == 0].all()
     assert model.stopping_["t"].wrong >= (~right).sum()
@@ -129,9 +119,7 @@ def test_trials_without_a_fold_calibrate_nothing():
     folds = stratified_folds(labels)
     folds[60:] = -1
     X[:, 60:, 1] += 1e3
-    choices = of_neighbours(3)
-    model = SequentialClassifier(choices, SECONDS, ("max_force",))
-    model.fit(X, {"t": labels}, folds, [choices] * 10)
+    model = calibrated(of_neighbours(3), X, {"t": labels}, folds)
     assert model.stopping_["t"].trials == 60
     assert not model.unusual_[:, 60:].any()
 

@@ -152,19 +152,12 @@ def test_rows_that_are_equal_but_for_rounding_are_not_equal():
     assert tied_across_labels(rows, np.array([0, 1, 1, 0, 1, 1])) == 2
 
 
-def with_joints(fitted, change):
-    """The fit of trials whose joint angles a function of their place and themselves
-    gives."""
-    trials = []
-    for i, trial in enumerate(fitted.measured.trials):
-        recording = replace(trial.recording, joints=change(i, trial.recording.joints))
-        trials.append(replace(trial, recording=recording))
-    return replace(fitted, measured=replace(fitted.measured, trials=tuple(trials)))
-
-
 def test_angles_in_degrees_name_some_recordings_and_count_the_others(fitted):
-    wrong = with_joints(fitted, lambda _, joints: np.degrees(joints))
-
+    trials = []
+    for trial in fitted.measured.trials:
+        joints = np.degrees(trial.recording.joints)
+        trials.append(replace(trial, recording=replace(trial.recording, joints=joints)))
+    wrong = replace(fitted, measured=replace(fitted.measured, trials=tuple(trials)))
     assert len(warnings_with(wrong, "beyond its limits")) == 3
     (line,) = warnings_with(wrong, "further recordings with such joint angles")
-    assert line.startswith(f"warning: {len(fitted.measured.trials) - 3} ")
+    assert line.startswith(f"warning: {len(trials) - 3} ")

@@ -12,19 +12,11 @@ from train.simulate.scene import load
 SCENES = ROOT / "train" / "scenes"
 
 
-@pytest.fixture(scope="module")
-def scene():
-    """A scene of two kinds, one of which shares work among its effects."""
+def test_the_parts_of_all_trials_add_up_to_the_run():
+    """Of two kinds, one of which shares work among its effects."""
     box = one_object(name="box")
-    return make(one_object(family="foam") + box, "inertia", after_s=0.2)
-
-
-@pytest.fixture(scope="module")
-def spent(scene):
-    return costs(scene, [spec for specs in kinds(scene).values() for spec in specs])
-
-
-def test_the_parts_of_all_trials_add_up_to_the_run(scene, spent):
+    scene = make(one_object(family="foam") + box, "inertia", after_s=0.2)
+    spent = costs(scene, [spec for specs in kinds(scene).values() for spec in specs])
     together = sum(
         len(specs) * sum(spent.of(effects).values())
         for effects, specs in kinds(scene).items()

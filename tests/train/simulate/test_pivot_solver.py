@@ -90,21 +90,12 @@ class Beds:
         y = self.free - self.way(loads)
         _, held = self.springs(y)
         k = held.sum(axis=1)
-        stiffness = k.sum(axis=0)
-        divisors = np.where(stiffness > 0.0, stiffness, 1.0)
-        mean = (k * self.lever).sum(axis=0) / divisors
-        spread = (k * (self.lever - mean) ** 2).sum(axis=0)
-        r0, r1 = self.way(self.loads(y) - loads)
-        # (I + C H) p = r, about the mean lever, where H is diagonal.
-        c00, c01, c11 = self.c
-        a01 = c01 + mean * c11
-        a00 = c00 + mean * (c01 + a01)
-        r0 = r0 + mean * r1
-        product = (a00 * c11 - a01 * a01) * stiffness * spread
-        det = 1.0 + a00 * stiffness + c11 * spread + product
-        p0 = ((1.0 + c11 * spread) * r0 - a01 * spread * r1) / det
-        p1 = ((1.0 + a00 * stiffness) * r1 - a01 * stiffness * r0) / det
-        return np.abs(p0 - mean * p1) + 0.1 * np.abs(p1)
+        moments = [(k * self.lever**power).sum(axis=0) for power in range(3)]
+        h = np.moveaxis(np.array(moments)[[[0, 1], [1, 2]]], 2, 0)
+        c = np.moveaxis(self.c[[[0, 1], [1, 2]]], 2, 0)
+        left = self.way(self.loads(y) - loads).T[..., None]
+        step = np.linalg.solve(np.eye(2) + c @ h, left)[..., 0].T
+        return np.abs(step[0]) + 0.1 * np.abs(step[1])
 
 
 def test_newton_on_the_tilt_needs_its_line_search(monkeypatch):

@@ -1,7 +1,6 @@
 """An effect that is not called for costs nothing and changes nothing."""
 
 import json
-import re
 from itertools import product
 
 import pytest
@@ -18,7 +17,6 @@ from train.simulate.plan import (
     make_plan,
     module_of,
     required_effects,
-    summary,
 )
 from train.simulate.scene import from_dict
 from train.simulate.schema import EFFECTS, SENSOR_EFFECTS
@@ -71,12 +69,6 @@ def test_an_effect_not_called_for_is_not_loaded():
     assert json.loads(python("-c", program).stdout) == ["train.simulate.effects.base"]
 
 
-def modules_of(effects):
-    """The modules of a trial's effects, in the order in which their hooks run."""
-    shared = ("viscous",) if {"relaxation", "inertia"} & set(effects) else ()
-    return ("base", *shared, *effects)
-
-
 def test_adding_an_effect_leaves_the_others_draws():
     trial_scene = scene("noise")
     other_scene = scene("noise", "dead_taxels", "drift", "dropped_frames", "tilt")
@@ -100,7 +92,9 @@ def plan():
 
 def owners_of(effects, stage):
     """The modules whose hooks a trial of these effects runs in a stage, in order."""
-    have = [n for n in modules_of(effects) if hasattr(module_of(n), stage)]
+    shared = ("viscous",) if {"relaxation", "inertia"} & set(effects) else ()
+    names = ("base", *shared, *effects)
+    have = [n for n in names if hasattr(module_of(n), stage)]
     return have[-1:] if stage in INSTEAD else have
 
 
@@ -161,11 +155,3 @@ def test_a_spread_around_0_calls_for_its_effect_in_movable_objects():
         sentence = f"spread.{key} .*: give a movable object {partner}"
         with pytest.raises(InputError, match=sentence):
             from_dict({"object": wall, "spread": {key: 1e-3}})
-
-
-def test_a_summary_names_the_effects_that_run_and_those_that_do_not():
-    counted, unused, *_ = summary(scene("noise"))
-    counts = dict(re.findall(r"(\w+) \((\d+)\)", counted))
-    assert counts
-    assert not set(counts) & set(unused.partition(": ")[2].split(", "))
-    assert len(counts) + len(unused.partition(": ")[2].split(", ")) == len(EFFECTS)

@@ -70,19 +70,6 @@ class TestArm:
         assert (batch.force[0, :29] == 0.0).all()
         assert batch.force[0, 31] > 0.0
 
-    def test_contact_holds_the_arm_where_the_object_is(self):
-        # A rigid, fixed object: the skin's point at the contact does not go on along
-        # the push.
-        batch = press(width_m=0.05)
-        t = batch.trials
-        held = t.scene.kinematics.pose(batch.joints[0].T)
-        point = held.origin + held.rotation[2] * t.contact.z[0]
-        along = ((point - t.contact.face[:, :1]) * t.contact.normal[:, :1]).sum(
-            axis=0
-        ) + RADIUS
-        touched = np.flatnonzero(batch.force[0] > 0.0)
-        assert np.abs(along[touched]).max() < 2e-3
-
 
 class TestSliding:
     MASS = 2.0

@@ -65,7 +65,6 @@ MISTAKES = [
         0.003,
         "step_s.sliding must be an even part of a frame's 0.01 s",
     ),
-    ("step_s.base", 1e-6, "step_s.base must be a number from 1e-05 to 1, not 1e-06"),
     ("skin.cols", 2, "skin.cols must be a whole number from 3 to 1000, not 2"),
     ("motion.travel_s", 0.1, "the arm's stroke ends after 0.1 s (motion.travel_s, or"),
     (
@@ -114,7 +113,6 @@ MISTAKES = [
         "object 'thing': unknown key modulus_pa; allowed: name",
     ),
     ("object.0.base_m", 0.2, "object 'thing': height_m is missing"),
-    ("object.0.cover_spread", 0.1, "object 'thing': cover_n_m is missing"),
 ]
 
 

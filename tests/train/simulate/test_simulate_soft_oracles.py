@@ -61,9 +61,8 @@ class TestBed:
 
 
 def layer_solution(half_width):
-    """Load, depth and mean pressure's peak of a cylinder of radius 1 on a bonded layer
-    of E = 1 and H = 1 without lateral strain, by its Green's function (Fourier),
-    half_width a."""
+    """Load and depth of a cylinder of radius 1 on a bonded layer of E = 1 and H = 1
+    without lateral strain, by its Green's function (Fourier), half_width a."""
     n = 8192
     step = 1 / 200
     w = 2.0 * np.pi * np.fft.rfftfreq(n, step)
@@ -80,30 +79,16 @@ def layer_solution(half_width):
         toeplitz(green[:points]), np.stack([np.ones(points), x * x / 2.0]).T
     ).T
     depth = curved[0] / flat[0]  # no pressure at the edge
-    pressure = depth * flat - curved
-    return pressure.sum(), depth, pressure.max() / pressure.mean()
+    return (depth * flat - curved).sum(), depth
 
 
 class TestLateral:
-    @pytest.mark.parametrize(("part", "bound"), [(0.1, 0.2), (0.6, 0.1)])
-    def test_load_and_width_are_the_elastic_layers(self, part, bound):
-        load, depth, peak = layer_solution(part)
-        # Columns so fine that the sum is the integral; E = H = R = 1.
-        x = np.linspace(0.0, 2.0, 4001)
-        gaps = x * x / 2.0 + lateral.delay(x, np.array(1.0))
-        inside = np.maximum(depth - gaps, 0.0)
-        force = 2.0 * inside.sum() * (x[1] - x[0]) + 2.0 * lateral.MARGIN * depth
-        assert force == pytest.approx(load, rel=bound)
-        assert x[inside > 0.0].max() == pytest.approx(part, rel=bound)
-        shape = np.sqrt(inside[inside > 0.0])
-        assert shape.max() / shape.mean() == pytest.approx(peak, rel=0.05)
-
     def test_the_bed_of_taxels_keeps_to_it(self):
         foam = one_object(family="foam", modulus_pa=12e3, depth_m=0.1, relax_ratio=0.0)
         batch = run(make(foam))
         depth = batch.traces["depth_m"][0, -1] / 0.1
         parts_of_depth = (0.2, 0.3, 0.4)
-        loads, depths, _ = zip(*map(layer_solution, parts_of_depth), strict=True)
+        loads, depths = zip(*map(layer_solution, parts_of_depth), strict=True)
         scale = RADIUS / 0.1
         want = np.interp(depth * scale, depths, loads) / scale
         length = batch.trials.scene.skin.pitch[0] * batch.trials.bed.weight[:, 0].sum()
@@ -131,30 +116,18 @@ class TestAskew:
         assert askew(rising, ends) == [0.0, 0.0, 2.0, 0.0]
         assert askew(falling, ends) == [0.0] * 4
 
-    @pytest.mark.parametrize(
-        ("degrees", "force", "depth_mm", "peak", "rows"),
-        [
-            (17.0, 2.94, 18.1, 0.364, [1.288, 0.854, 0.524, 0.236, 0.034, 0.0]),
-            (17.0, 6.00, 25.5, 0.445, [1.828, 1.454, 1.086, 0.786, 0.522, 0.258]),
-        ],
-    )
-    def test_rows_bear_the_loads_of_an_elastic_block(
-        self,
-        degrees,
-        force,
-        depth_mm,
-        peak,
-        rows,
-    ):
+    def test_rows_bear_the_loads_of_an_elastic_block(self):
+        """At 17 degrees, 25.5 mm deep."""
+        rows = [1.828, 1.454, 1.086, 0.786, 0.522, 0.258]
         foam = one_object(family="foam", modulus_pa=8e3, depth_m=0.1, relax_ratio=0.0)
         t = run(make(foam)).trials
-        slope = np.tan(np.radians(degrees))
+        slope = np.tan(np.radians(17.0))
         pitch = t.scene.skin.pitch[0]
         # The face covers the skin's rows but the first and the last.
-        depth = 1e-3 * depth_mm - slope * (np.arange(16) - 0.5) * pitch
+        depth = 0.0255 - slope * (np.arange(16) - 0.5) * pitch
         t.bed.weight[:] = np.pad(np.ones(14), 1)[:, None]
         t.touch.line_depth[:] = depth[:, None]
-        t.touch.force[:] = force
+        t.touch.force[:] = 6.0
         # Half a column from the nearest on either side, as in the block's sum over
         # taxels.
         columns = len(t.bed.columns)
@@ -167,7 +140,7 @@ class TestAskew:
         borne = image.sum(axis=1)[1:7]
         assert borne.sum() == pytest.approx(sum(rows), rel=0.06)
         assert borne == pytest.approx(rows, abs=0.16 * max(rows))
-        assert image.max() == pytest.approx(peak, rel=0.1)
+        assert image.max() == pytest.approx(0.445, rel=0.1)
 
 
 def test_foam_pressed_flat_is_as_hard_as_the_skin():

@@ -3,7 +3,7 @@ judged."""
 
 import numpy as np
 
-from tests.train.simulate.scenes import Law, Rig, slider
+from tests.train.simulate.scenes import Law, slider
 from train.simulate import contact
 from train.simulate.contact import GRAVITY
 
@@ -59,19 +59,10 @@ def test_the_judge_rejects_a_finite_trace_that_reset_itself():
     assert "no force though pressed" in judge(trace, 1e3, 5.0, MU_S, MU_K)
 
 
-def test_taxel_forces_as_stiffness_times_depth_lose_digits():
-    n = 200
-    stiff = 1e15
+def test_taxels_bear_the_force_to_its_last_digits():
+    """Stiffness times depth loses digits of stiff springs."""
     rng = np.random.default_rng(2)
-    gaps = np.sort(rng.uniform(0.0, 1e-3, (7, n)), axis=0)
-    gaps[0] = 0.0
-    k = np.full((7, n), stiff)
-    trace = Rig(0.01, Law(*contact.bed_law(gaps, k), gaps)).run(50)
-    force = trace.force[-1]
-    loads = contact.spring_loads(trace.depth[-1:], gaps, k, 1.0)
-    naive = loads.sum(axis=(0, 1))
+    force = rng.uniform(0.0, 10.0, 200)
+    loads = rng.uniform(0.0, 1.0, (7, 16, 200))
     contact.share_out(force, loads)
-    shared = loads.sum(axis=(0, 1))
-    assert np.abs(naive / force - 1.0).max() > 1e-4
-    held = naive > 0.0
-    np.testing.assert_allclose(shared[held], force[held], rtol=1e-14)
+    np.testing.assert_allclose(loads.sum(axis=(0, 1)), force, rtol=1e-14)

@@ -4,6 +4,7 @@ import math
 from dataclasses import replace
 from functools import partial
 
+import numpy as np
 import pytest
 
 from edge.errors import InputError
@@ -34,27 +35,17 @@ def few_draws(monkeypatch):
     monkeypatch.setattr(truth, "REDRAWS", 8)
 
 
-@pytest.fixture(scope="module")
-def boxes():
-    """Boxes, some of which are too heavy to slide."""
-    return scene(BOX, trials={"count": 12, "after_s": 1.4})
-
-
-@pytest.fixture(scope="module")
-def simulations(boxes):
-    return [recording.meta["simulation"] for _, recording in simulate(boxes)]
-
-
 class TestLabels:
     def test_a_movable_object_slides_within_the_window(
         self,
-        boxes,
-        simulations,
         tmp_path,
     ):
+        """Some of the boxes are too heavy to slide."""
+        boxes = scene(BOX, trials={"count": 12, "after_s": 1.4})
         stuck = (run(boxes).traces["slide_m"][:, :142].max(axis=1) < 0.02).sum()
         assert stuck > 0
-        assert sum(t["redrawn"] > 0 for t in simulations) == stuck
+        redrawn = [r.meta["simulation"]["redrawn"] for _, r in simulate(boxes)]
+        assert np.count_nonzero(redrawn) == stuck
         assert write(boxes, tmp_path).redrawn == {"moved too little": stuck}
 
     def test_redraws_do_not_depend_on_the_batch(self, monkeypatch):
@@ -114,14 +105,13 @@ class TestFamilies:
         assert len(set(masses)) == 6
         for o in trial_scene.objects:
             mu = o.values["friction_static"].low
-            mass = o.values["mass_kg"].low
-            assert mu * mass * 9.80665 <= 6.0
             assert 0.8 * mu <= o.values["friction_kinetic"].low <= 0.95 * mu
             assert o.conditions == ("fixed", "movable")
 
     @pytest.mark.parametrize(
         "keys",
         [
+            {},
             {"family": "foam", "friction_static": [0.3, 1.0], "skin_friction": 0.9},
             {"family": "foliage", "stem_count": [5, 30], "stem_n_m": [1.0, 50.0]},
             {"family": "foliage", "stem_count": 3},
@@ -157,7 +147,6 @@ class TestFamilies:
                 "family 'crate': unknown key colour; allowed: name.*, count",
             ),
             ({"friction_kinetic": 0.2}, "unknown key friction_kinetic; "),
-            ({"base_m": 0.2}, "family 'crate': object 'crate 01': height_m is missing"),
         ],
     )
     def test_a_family_that_makes_no_sense_is_refused(self, change, says):

@@ -8,6 +8,7 @@ import shlex
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -79,17 +80,10 @@ def promised(report):
     return figures
 
 
-@dataclass(frozen=True)
-class Folders:
-    """The report, and fresh touches of the same objects."""
-
-    report: Path
-    fresh: Path
-
-
 @pytest.fixture(scope="module")
 def folders(tmp_path_factory):
-    """A quick report without the savings, which the first screen does not show."""
+    """A quick report without the savings, which the first screen does not show, and
+    fresh touches of the same objects."""
     folder = tmp_path_factory.mktemp("promises")
     data = str(folder / "data")
     write(scenes.load(SCENE, seed=SEED), data)
@@ -100,7 +94,7 @@ def folders(tmp_path_factory):
         patch.setattr(costs, "measure", lambda *_, **__: [])
         options = Options(quick=True, jobs=2)
         report = running.tradeoff([data], folder / "report", str(path), options)
-    return Folders(report, folder / "fresh")
+    return SimpleNamespace(report=report, fresh=folder / "fresh")
 
 
 @cache

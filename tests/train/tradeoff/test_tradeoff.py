@@ -2,7 +2,7 @@
 
 import argparse
 import json
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from types import SimpleNamespace
@@ -29,7 +29,7 @@ from train.report.work import Workers
 from train.tradeoff import answer, board, choices, costs, early
 from train.tradeoff import run as running
 from train.tradeoff.choices import chosen as make_choice
-from train.tradeoff.choices import followed, unseen
+from train.tradeoff.choices import followed
 from train.tradeoff.front import ParetoFront
 from train.tradeoff.run import Options
 
@@ -63,11 +63,6 @@ def test_windows_are_measured_where_the_curve_is_steep(monkeypatch):
     assert made == [0.2, 0.6, 1.2, 0.9, 0.8, 1.0]
 
 
-def test_unseen_objects_have_a_figure_only_where_they_were_left_out():
-    assert unseen(chosen(50)) is None
-    assert unseen(chosen(60, 50)).accuracy == 0.5
-
-
 @pytest.fixture(scope="module")
 def fronted(recordings, tmp_path_factory):
     """front.json with one point: 0.4 s."""
@@ -96,7 +91,6 @@ def test_export_writes_the_very_model_of_a_point(recordings, fronted, tmp_path, 
     ("more", "sentence"),
     [
         (["--k", "3"], "--front makes the model that was measured; drop --k"),
-        (["--front", "1.5"], "the fastest point takes 410 ms"),
         (["--data", "hard_0.npz", "hard_1.npz"], "was measured on other recordings"),
     ],
 )
@@ -217,23 +211,15 @@ def test_the_cheapest_use_may_be_early_and_its_price_has_an_interval():
     assert "run --model build/model.onnx --error 0.1" in row["command"]
 
 
-def comparison(right, seconds=(0.2, 0.6, 1.0)):
-    """Fixed windows with these outcomes; every confidence is a half."""
-    right = np.array(right, dtype=bool)
-    confidence = np.full(right.shape, 0.5)
-    course = Course([confidence], [~right], np.zeros(right.shape, dtype=bool))
-    return early.StoppingComparison(seconds, right, confidence, course, [])
-
-
-def share_right(*shares):
-    """(windows, 100) of which so many are right."""
-    return np.arange(100) < 100 * np.array(shares)[:, None]
-
-
 class TestEarly:
     def test_a_calibrated_confidence_has_no_calibration_error(self):
-        for share, error in ((0.5, 0.0), (0.9, 0.4)):
-            compared = comparison(share_right(share, share, share))
+        """Every confidence is a half."""
+        half = np.full((3, 100), 0.5)
+        for percent, error in ((50, 0.0), (90, 0.4)):
+            right = np.tile(np.arange(100) < percent, (3, 1))
+            course = Course([half], [~right], np.zeros_like(right))
+            seconds = (0.2, 0.6, 1.0)
+            compared = early.StoppingComparison(seconds, right, half, course, [])
             assert compared.calibration_error == pytest.approx(error)
 
     def test_early_decisions_follow_the_rules_that_the_model_of_all_contacts_certifies(
@@ -319,18 +305,6 @@ def test_a_board_file_of_another_model_is_one_sentence(recordings, tmp_path, ref
     assert not any((tmp_path / "out").iterdir())
 
 
-@dataclass(frozen=True)
-class Written:
-    """A report that was written, and the digest of its recordings."""
-
-    report: Path
-    digest: str
-
-    @property
-    def text(self):
-        return self.report.read_text()
-
-
 def quickly(change, like, answered=costs.answered):
     """A change with a quick choice, even where that among all candidates is asked
     for."""
@@ -339,7 +313,8 @@ def quickly(change, like, answered=costs.answered):
 
 @pytest.fixture(scope="module")
 def written(tmp_path_factory):
-    """The report on 28 touches, with few windows and changes."""
+    """The report on 28 touches, its text, and the digest of its recordings, with few
+    windows and changes."""
     folder = tmp_path_factory.mktemp("tradeoff")
     data = str(save_touches(folder / "data", 14, rate=25.0))
     single = part(load(folder / "data" / "hard_00.npz"), slice(1))
@@ -358,7 +333,7 @@ def written(tmp_path_factory):
         patch.setattr(costs, "EVERY", ())
         patch.setattr(costs, "coarser", lambda *_: [])
         report = running.tradeoff([data], folder / "out", str(path), options)
-    return Written(report, digest)
+    return SimpleNamespace(report=report, text=report.read_text(), digest=digest)
 
 
 def test_the_report_needs_no_other_page(written):
