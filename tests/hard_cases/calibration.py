@@ -13,26 +13,27 @@ from train.model.novelty import TAIL, UNUSUAL_RATE, limits_of
 from train.model.rules import upper_limit
 
 
-def quantile(ordered, share):
-    """Of sorted numbers, between two of them by interpolation."""
-    place = mpf(share) * (len(ordered) - 1)
-    low = int(mpmath.floor(place))
-    high = min(low + 1, len(ordered) - 1)
-    return ordered[low] + (place - low) * (ordered[high] - ordered[low])
-
-
 def limits_error(spread, seed):
     """Larger error of the typical score and the limit, over them, of scores from 1 to
-    so many times as much."""
+    so many times as much.
+
+    The excess of the next score's logarithm over the tail is Lomax: of the shape n it
+    is more than n times the mean of the n excesses, times u, with a chance of
+    (1 + u)^-n.
+    """
     rng = np.random.default_rng(seed)
-    scores = spread ** rng.random((1, int(rng.integers(20, 200))))
+    trials = int(rng.integers(20, 200))
+    scores = spread ** rng.random((1, trials))
     (typical,), (limit,) = limits_of(scores, UNUSUAL_RATE)
     with mpmath.workdps(50):
         logs = sorted(mpmath.log(mpf(score)) for score in scores[0].tolist())
-        tail = quantile(logs, mpf(9) / 10)  # a float is a little more
-        beyond = [value - tail for value in logs if value >= tail]
-        ratio = mpmath.log(mpf(TAIL) / mpf(UNUSUAL_RATE))
-        true = tail + sum(beyond) / len(beyond) * ratio, quantile(logs, 0.5)
+        n = int(mpmath.ceil(mpf(trials) / TAIL))
+        tail = logs[-n - 1]
+        excess = mpmath.fsum(logs[-n:]) - n * tail
+        rate = max(mpf(UNUSUAL_RATE), mpf(1) / (trials + 1))
+        chance = rate / (mpf(n + 1) / (trials + 1))
+        middle = (logs[(trials - 1) // 2] + logs[trials // 2]) / 2
+        true = tail + excess * (chance ** (mpf(-1) / n) - 1), middle
         pairs = zip((limit, typical), map(mpmath.exp, true), strict=True)
         return float(max(abs(mpf(value) / want - 1) for value, want in pairs))
 

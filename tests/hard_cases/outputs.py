@@ -82,7 +82,7 @@ class Whole:
         self.y = labels_of(n)
         # Early windows: of the same trials, with less of what tells them apart.
         self.X = np.stack([X[::-1], 0.5 * (X + X[::-1]), X])
-        early = Early(POINTS_S[-1], FIRST, [FIRST] * 10) if kind == EARLY else None
+        early = Early(FIRST, [FIRST] * 10) if kind == EARLY else None
         classifier = SequentialClassifier(CHOICES, POINTS_S, early=early)
         folds = stratified_folds(self.y["object"])
         self.fitted = classifier.fit(self.X, self.y, folds, [CHOICES] * 10)

@@ -47,7 +47,8 @@ BESIDE = 0.25
 """Weight of directions that tell no labels apart, a power of two."""
 LEAST = 1e-3
 """Scores below this, as of copies, count as much."""
-TAIL = 0.1
+TAIL = 10
+"""One of so many scores lies in their tail."""
 FOLDS = 20
 """Folds of the held-out scores: more than a choice has, as a space of fewer trials finds
 all others newer."""
@@ -371,7 +372,7 @@ def limits_of(scores: Floats, rate: float) -> tuple[tuple[float, ...], ...]:
     """
     logs = np.sort(np.log(np.maximum(scores, LEAST)), axis=1)
     trials = logs.shape[1]
-    count = math.ceil(TAIL * trials)
+    count = math.ceil(trials / TAIL)
     tails = logs[:, -count - 1]
     excess = logs[:, -count:].mean(axis=1) - tails
     share = (count + 1) / (trials + 1)
