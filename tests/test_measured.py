@@ -54,17 +54,7 @@ def test_each_table_names_its_command_commit_machine_and_date(name):
     )
 
 
-OLDER = {"kills"}
-"""Tables that are to be measured anew; the test of each fails when it has been."""
-BY_COMMIT = [
-    pytest.param(
-        name, marks=pytest.mark.xfail(name in OLDER, strict=True, reason="measure anew")
-    )
-    for name in TABLES
-]
-
-
-@pytest.mark.parametrize("name", BY_COMMIT)
+@pytest.mark.parametrize("name", TABLES)
 def test_each_table_was_measured_at_a_commit_without_local_changes(name):
     """Otherwise nobody can say what was measured: commit, then `make measured`."""
     assert "-dirty" not in TABLES[name].splitlines()[0]
