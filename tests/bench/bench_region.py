@@ -9,7 +9,7 @@ import pytest
 from edge.demo import FOLDER
 from edge.recording import load
 from edge.touch.region import largest_region
-from tests.edge.touch.test_region import SHAPES
+from tests.edge.touch.test_components import SHAPES
 
 THRESHOLD = 50
 TOUCHES = ("cardboard-box-fixed", "foam-block-fixed")
@@ -44,11 +44,9 @@ region is the sums of its rows and columns, one mask at a time, which OpenCV's c
 leaves out."""
 
 
-@pytest.mark.parametrize(
-    "name", [*TOUCHES, "full", "checkerboard", "serpentine", "empty"]
-)
+@pytest.mark.parametrize("name", [*TOUCHES, *SHAPES])
 def bench_region(name, against):
-    frame = widest(name) if name in TOUCHES else SHAPES[name]
+    frame = widest(name) if name in TOUCHES else np.uint16(100) * SHAPES[name]
     assert (opencv(frame) or [0])[0] == (ours(frame) or [0])[0]
     rivals = {"OpenCV": (partial(opencv, frame), MOST if name in TOUCHES else None)}
     against(partial(ours, frame), rivals, calls=50)
