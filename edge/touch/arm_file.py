@@ -18,7 +18,7 @@ def read_arm(
         InputError: as `Chain.from_toml` and `Chain.from_urdf`; or links are given for a
             TOML file, or a link is missing for a URDF.
     """
-    if Path(path).suffix.lower() in (".urdf", ".xml"):
+    if Path(path).suffix.lower() in (".urdf", ".xml", ".xacro"):
         if base is None or tip is None:
             raise InputError(
                 f"{path}: a URDF needs --base and --tip, the arm's first link and the "
