@@ -537,9 +537,9 @@ function drawUndo({ undo }) {
 let notices = [];
 
 function drawNotices(picture) {
-  let known = notices;
-  while (!known.every((text, i) => text === picture.notices[i])) known = known.slice(1);
-  for (const text of picture.notices.slice(known.length)) {
+  let former = notices;
+  while (!former.every((text, i) => text === picture.notices[i])) former = former.slice(1);
+  for (const text of picture.notices.slice(former.length)) {
     const notice = element("li");
     $("notices").append(message(notice, text, () => notice.remove()));
   }
