@@ -32,7 +32,7 @@ def policies(model: Model, error: float) -> Mapping[str, Policy]:
     """{task: its policy} for an error rate.
 
     Raises:
-        InputError: the rate is outside (0, 1), or is certified for no task.
+        InputError: as `stopping_rules`.
     """
     policy_of: dict[str, Policy] = {}
     for task, rule in stopping_rules(model, error).items():
@@ -168,13 +168,14 @@ def paired(
     info: ModelInfo, candidate: Decided, decided: Mapping[str, Decided]
 ) -> Decided:
     """The answer to a product by its factors' labels. A pair that was never met has no
-    name."""
+    name, nor has one with an unknown factor."""
     task = info.tasks[candidate.task]
     indices = {}
     likely = 1.0
     for factor in task.factors:
         answer = decided[factor]
-        indices[factor] = info.tasks[factor].labels.index(str(answer.label))
+        labels = info.tasks[factor].labels
+        indices[factor] = labels.index(answer.label) if answer.label in labels else -1
         likely *= answer.confidence or 0.0
     index = product_label(task.factors, indices)
     if index is None or candidate.label is None:

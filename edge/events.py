@@ -92,8 +92,8 @@ class Decided:
         Args:
             doubts: {flag: whether it holds}, of those in `edge.flags`.
         """
-        held = dict.fromkeys(self.flags, True) | doubts
-        flags = in_order({flag for flag, holds in held.items() if holds})
+        states = dict.fromkeys(self.flags, True) | doubts
+        flags = in_order({flag for flag, holds in states.items() if holds})
         return replace(self, flags=flags)
 
     def to_dict(self) -> dict[str, Any]:

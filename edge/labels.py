@@ -16,8 +16,8 @@ def plain(labels: Labels, path: str) -> dict[str, str]:
     printed; a warning says so."""
     texts = []
     for text in (*labels, *labels.values()):
-        shown = [c if c.isprintable() else "_" for c in text.strip()]
-        texts.append("".join(shown) or "_")
+        letters = [c if c.isprintable() else "_" for c in text.strip()]
+        texts.append("".join(letters) or "_")
     read = dict(zip(texts, texts[len(labels) :], strict=False))
     LOG.warning(f"{path}: the labels {dict(labels)} are read as {read}")
     return read

@@ -1,5 +1,4 @@
-"""Nodes and constants of an ONNX graph, and the projection of `train.model.projection` as its
-nodes."""
+"""Nodes and constants of an ONNX graph, and a projection of features as its nodes."""
 
 from __future__ import annotations
 
@@ -138,10 +137,10 @@ class Builder:
         place = len(self.made)
         names = [name or f"{operator} {place} {i}" for i, name in enumerate(outputs)]
         # skl2onnx orders nodes by their names, and those without one by their addresses.
-        made = helper.make_node(
+        proto = helper.make_node(
             operator, self._names(inputs), names, name=str(place), **attributes
         )
-        self.made.append(made)
+        self.made.append(proto)
         return names
 
     def _names(self, inputs: Sequence[Any]) -> list[str]:

@@ -40,7 +40,7 @@ ALONE = {*measures.ALONE.values(), ("contact", "area")} - {("skin", "stiffness")
 DOUBTS = ("novelty", "remoteness")
 FLAGS = ("out_of_range", *DOUBTS)
 """Outputs of the model that are of no task."""
-OTHERS = re.compile(r"[^\w -]", re.ASCII)
+SPECIAL = re.compile(r"[^\w -]", re.ASCII)
 """Letters that may mean something else in C."""
 ENDS = "label scores distances neighbours label_distances".split()
 OF_LAYOUT = "rows cols wraps threshold_counts onset release_s radius_m row0_z_m".split()
@@ -187,7 +187,7 @@ class Source:
         return largest + (len(measures.QUANTITIES) + 4) * self._frames
 
     def _kernels(self) -> None:
-        """The tables of the features that are made of kernels."""
+        """The tables of the kernels, from which some features are computed."""
         for name in ("taxel_kernels", "zone_kernels"):
             table = self._info.kernels.get(name, KernelTable((), ()))
             flat: list[int] = []
@@ -355,7 +355,7 @@ def array(kind: str, values: Iterable[object]) -> str:
 def quoted(text: str) -> str:
     """A text as a literal of C: ASCII, and other bytes of UTF-8 by their numbers."""
     letters = text.encode().decode("latin-1")
-    return '"' + OTHERS.sub(lambda other: f"\\{ord(other[0]):03o}", letters) + '"'
+    return '"' + SPECIAL.sub(lambda match: f"\\{ord(match[0]):03o}", letters) + '"'
 
 
 def lacks(info: ModelInfo) -> Iterable[str]:

@@ -78,8 +78,8 @@ class CompiledGraph:
                 "decision_point": np.array([point]),
             }
             values = graph.run(list(graph.makers), inputs)
-            made = dict(zip(graph.makers, values, strict=True))
-            self._values.append(graph.constants | inputs | made)
+            results = dict(zip(graph.makers, values, strict=True))
+            self._values.append(graph.constants | inputs | results)
         self._variable = {"features"}
         for node in model.contents.nodes:
             if not self._variable.isdisjoint(node.inputs):
@@ -102,18 +102,18 @@ class CompiledGraph:
         for i, node in enumerate(nodes):
             last.update(dict.fromkeys([*node.inputs, *node.outputs], i))
         last.update(dict.fromkeys(outputs, len(nodes)))
-        taken = {"features": (0, self._shape("features")[1])}
+        spans = {"features": (0, self._shape("features")[1])}
         for i, node in enumerate(nodes):
             for name in node.outputs:
                 size = prod(self._shape(name))
                 begin = 0
-                for low, high in sorted(taken.values()):
+                for low, high in sorted(spans.values()):
                     if low < begin + size:
                         begin = max(begin, high)
-                taken[name] = begin, begin + size
+                spans[name] = begin, begin + size
                 self.places[name] = begin
                 self.arena = max(self.arena, begin + size)
-            taken = {name: span for name, span in taken.items() if last[name] > i}
+            spans = {name: span for name, span in spans.items() if last[name] > i}
 
     def _step(self, node: Node) -> Step:
         """The step of a node."""

@@ -299,7 +299,7 @@ def _label_distances(
     members = np.full((len(sizes), int(sizes.max())), len(labels))
     for label, size in enumerate(sizes):
         members[label, :size] = np.flatnonzero(labels == label)
-    taken = np.arange(counts.max()) < counts[:, None]
+    is_nearest = np.arange(counts.max()) < counts[:, None]
     wider = build.node("Pad", squares, [0, 0, 0, 1], np.inf)
     squares_of_label = build.node("Gather", wider, members, axis=1)
     most = counts.max(keepdims=True)
@@ -307,7 +307,7 @@ def _label_distances(
         "TopK", [squares_of_label, most], ["", ""], axis=2, largest=0
     )
     roots = build.node("Round", build.node("Sqrt", nearest))
-    counted = build.node("Where", taken, roots, 0.0)
+    counted = build.node("Where", is_nearest, roots, 0.0)
     total = build.node("ReduceSum", counted, [2], keepdims=0)
     distances = build.node("Div", total, counts.astype(np.float64))
     factors = build.by_decision_point(scales)

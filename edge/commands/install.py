@@ -132,14 +132,14 @@ def beside(target: Path, end: str) -> Path:
 def place(model: Path, golden: Path, target: Path) -> None:
     """Put the model and its golden file in place, and keep the model that runs."""
     data = read_bytes(model, LARGEST_BYTES)
-    kept = _golden_of(target, data)
-    is_new = not kept.exists()
-    _write(kept, read_bytes(golden, LARGEST_BYTES))
+    target_golden = _golden_of(target, data)
+    is_new = not target_golden.exists()
+    _write(target_golden, read_bytes(golden, LARGEST_BYTES))
     try:
         _replace(target, data)
     except InputError:
         if is_new:
-            kept.unlink()
+            target_golden.unlink()
         raise
 
 

@@ -37,10 +37,11 @@ def skin_map(served: list[int], invalid: Booleans) -> str:
 
 def below_rest(skin: Skin) -> int:
     """The number of taxels that rest below their calibration by the threshold, which no
-    touch does."""
+    touch does; 0 without a threshold, as noise does too."""
+    threshold = skin.layout.threshold_counts
     raw, valid = skin.raw()
-    below = skin.baseline.change(raw.ravel()) < -skin.layout.threshold_counts
-    return int((below & valid.ravel()).sum())
+    below = skin.baseline.change(raw.ravel()) < -threshold
+    return int((below & valid.ravel()).sum()) if threshold else 0
 
 
 def run(arguments: argparse.Namespace) -> int:

@@ -1,6 +1,5 @@
 """A model of a microcontroller that serves frames, for the fake bus."""
 
-import random
 from typing import Self
 
 import numpy as np
@@ -41,15 +40,9 @@ class FakeBlock(FakeChip):
         self._axes = axes
 
     @classmethod
-    def of(
-        cls,
-        spec: ChipSpec,
-        sense: Sense,
-        *,
-        timed: bool,
-        power_up: random.Random,
-    ) -> Self:
-        """The model of a skin's chip, with the axes that its driver reads."""
+    def of(cls, spec: ChipSpec, sense: Sense, **options: object) -> Self:
+        """The model of a skin's chip, with the axes that its driver reads; it has no use
+        for the options."""
         if spec.kind is ThreeAxisBlock:
             return cls(sense, taxels=AXES * len(spec.taxels), axes=AXES)
         return cls(sense, taxels=len(spec.taxels), bits=spec.option("bits"))

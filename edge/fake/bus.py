@@ -201,10 +201,10 @@ class FakeBus:
 
     def chips_at(self, address: int) -> list[FakeChip]:
         """Every chip that hears the address."""
-        rooms = [self.chips]
+        segments = [self.chips]
         for mux in self.muxes():
-            rooms += [mux.channels[n] for n in mux.connected]
-        return [room[address] for room in rooms if address in room]
+            segments += [mux.channels[n] for n in mux.connected]
+        return [chips[address] for chips in segments if address in chips]
 
     def _carry(self, message: Message, chips: Sequence[FakeChip]) -> None:
         t = self.now()

@@ -94,11 +94,11 @@ def accepted(meta: Mapping[str, Any]) -> dict[str, str]:
     """{task: label} that accepts the decisions of a kept touch, where they name a label
     and nobody has given one yet, nor others from which another follows."""
     labels = meta.get("labels", {})
-    known = CATEGORY.completed(labels)
+    all_labels = CATEGORY.completed(labels)
     out = {
         task: answer["label"]
         for task, answer in decisions(meta).items()
-        if task not in known and answer["label"] not in (None, UNKNOWN)
+        if task not in all_labels and answer["label"] not in (None, UNKNOWN)
     }
     if CATEGORY.contradiction({**labels, **out}):
         out.pop(CATEGORY.task, None)

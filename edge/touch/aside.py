@@ -44,7 +44,7 @@ RESTLESS_LOOKS = 4
 LONE_LOOKS = 4
 """A taxel that lasts is named after so many looks in a small region."""
 LONGER_LOOKS = 2
-"""And so many looks later than it may be set aside, as it may be a touch after all."""
+"""That is so many looks after it may be set aside, as it may be a touch after all."""
 QUIET_LOOKS = 40
 """A broken taxel is followed again after so many looks without contact: ten seconds, as
 one that wanders comes back."""

@@ -186,12 +186,12 @@ class _Course:
             values = self._measured(first).T
         else:
             values = np.array(list(map(self._measured, group)), dtype=np.float64)
-        known = ~np.isnan(values)
-        complete = known.all(axis=1)
+        valid = ~np.isnan(values)
+        complete = valid.all(axis=1)
         sampled = np.zeros((len(values), len(times)))
         sampled[complete] = _resample(times, t, values[complete])
-        for i in np.flatnonzero(~complete & known.any(axis=1)):
-            sampled[i] = _resample(times, t[known[i]], values[i, known[i]])
+        for i in np.flatnonzero(~complete & valid.any(axis=1)):
+            sampled[i] = _resample(times, t[valid[i]], values[i, valid[i]])
         if first.quantity == "taxel_force":
             return sampled / self._scale
         return sampled - sampled[:, :1] if first.quantity == "joint_change" else sampled

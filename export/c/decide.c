@@ -166,8 +166,8 @@ static bool stop_product(const ec_task *task, answer *a) {
   bool sure = f[0]->stopped_by == EC_CONFIDENCE && f[1]->stopped_by == EC_CONFIDENCE;
   int16_t pair = -1;
   for (uint32_t i = 0; i < task->labels; i++) {
-    bool met = task->indices[0][i] == f[0]->label && task->indices[1][i] == f[1]->label;
-    if (met && pair < 0) pair = (int16_t)i;
+    bool matches = task->indices[0][i] == f[0]->label && task->indices[1][i] == f[1]->label;
+    if (matches && pair < 0) pair = (int16_t)i;
   }
   if (pair < 0 || a->label < 0) {
     withhold(a);

@@ -4,8 +4,8 @@
 
 /* Behind the vector, the arena is free until the graph is computed. */
 static double *const columns = ec_arena + EC_WIDTH; /* [quantity][frame] of a zone */
-static double *const known_t = ec_arena + EC_WIDTH + EC_QUANTITIES * EC_FRAMES;
-static double *const known = ec_arena + EC_WIDTH + (EC_QUANTITIES + 1) * EC_FRAMES;
+static double *const valid_t = ec_arena + EC_WIDTH + EC_QUANTITIES * EC_FRAMES;
+static double *const valid = ec_arena + EC_WIDTH + (EC_QUANTITIES + 1) * EC_FRAMES;
 static double *const samples = ec_arena + EC_WIDTH + (EC_QUANTITIES + 2) * EC_FRAMES;
 
 static const ec_row *felt[EC_FRAMES];
@@ -137,22 +137,22 @@ static void sample(const ec_feature *feature, uint32_t row, double step_s, doubl
   for (uint32_t i = 0; i < frames; i++) {
     double x = value(feature, row, i);
     if (x != x) continue;
-    known_t[n] = felt[i]->t;
-    known[n++] = x;
+    valid_t[n] = felt[i]->t;
+    valid[n++] = x;
   }
   uint32_t after = 0;
   for (uint32_t i = 0; i < feature->samples; i++) {
     double t = i * step_s;
-    while (after < n && known_t[after] <= t) after++;
-    out[i] = n ? known[0] : 0.0;
+    while (after < n && valid_t[after] <= t) after++;
+    out[i] = n ? valid[0] : 0.0;
     if (n < 2) continue;
     uint32_t high = after < 1 ? 1 : after > n - 1 ? n - 1 : after;
-    double step = known_t[high] - known_t[high - 1];
+    double step = valid_t[high] - valid_t[high - 1];
     if (step == 0.0) step = 1.0;
-    double fraction = (t - known_t[high - 1]) / step;
+    double fraction = (t - valid_t[high - 1]) / step;
     fraction = fraction < 0.0 ? 0.0 : fraction > 1.0 ? 1.0 : fraction;
-    double low = known[high - 1];
-    out[i] = fraction == 1.0 ? known[high] : low + fraction * (known[high] - low);
+    double low = valid[high - 1];
+    out[i] = fraction == 1.0 ? valid[high] : low + fraction * (valid[high] - low);
   }
   double first = out[0];
   for (uint32_t i = 0; i < feature->samples; i++) {

@@ -133,7 +133,7 @@ static void top_k(const ec_step *step) {
     double *places = ec_arena + step->outputs[1] + row * k;
     uint32_t count = 0;
     for (uint32_t i = 0; i < step->sizes[ALONG]; i++) {
-      double value = at(x, row * step->sizes[1] + i);
+      double value = at(x, row * step->sizes[ALONG] + i);
       if (count == k && !(value < values[k - 1])) continue;
       uint32_t place = count < k ? count++ : k - 1;
       for (; place > 0 && value < values[place - 1]; place--) {

@@ -85,7 +85,8 @@ def test_a_product_is_sure_where_both_factors_are(stops, stopped_by):
     assert "unsure" not in answered("y", "a", stops, FIXED).flags
 
 
-def test_a_pair_that_was_never_met_has_no_name():
-    answer = answered("x", "b")
+@pytest.mark.parametrize("first", ["x", None])
+def test_a_pair_that_was_never_met_or_an_unknown_factor_has_no_name(first):
+    answer = answered(first, "b")
     assert answer.label is None
     assert answer.confidence == 0.0

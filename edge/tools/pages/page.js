@@ -128,14 +128,14 @@ function drawShear(pen, { cols, shear }, touched, left, side) {
 
 function drawCurve(id, name, unit, t, values) {
   const [pen, width, height] = canvas(id);
-  const known = values.filter((value) => value !== null);
-  const most = Math.max(...known, 0);
+  const numbers = values.filter((value) => value !== null);
+  const most = Math.max(...numbers, 0);
   const end = Math.max(1.2, t.length ? t[t.length - 1] : 0);
   const left = 8, right = width - 8, top = 24, bottom = height - 18;
   pen.font = "13px system-ui, sans-serif";
   pen.fillStyle = colour("--text");
   pen.fillText(`${name}, ${unit}`, left, 14);
-  const now = known.length ? known[known.length - 1] : 0;
+  const now = numbers.length ? numbers[numbers.length - 1] : 0;
   pen.textAlign = "right";
   pen.fillText(`${shortNumber(now)} now`, right, 14);
   pen.fillStyle = colour("--quiet");
@@ -231,8 +231,9 @@ function field(name, label, action) {
 }
 
 function message(node, text, hide) {
-  node.replaceChildren(text, button("×", hide, "hide this message"));
-  setTimeout(hide, 60000);
+  const close = button("×", hide, "hide this message");
+  node.replaceChildren(text, close);
+  setTimeout(() => close.isConnected && hide(), 60000); // a later message keeps its own minute
   return node;
 }
 
@@ -537,9 +538,9 @@ function drawUndo({ undo }) {
 let notices = [];
 
 function drawNotices(picture) {
-  let known = notices;
-  while (!known.every((text, i) => text === picture.notices[i])) known = known.slice(1);
-  for (const text of picture.notices.slice(known.length)) {
+  let former = notices;
+  while (!former.every((text, i) => text === picture.notices[i])) former = former.slice(1);
+  for (const text of picture.notices.slice(former.length)) {
     const notice = element("li");
     $("notices").append(message(notice, text, () => notice.remove()));
   }

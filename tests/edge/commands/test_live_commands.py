@@ -27,8 +27,14 @@ def test_scan_over_the_fake_maps_the_whole_skin(edge, quiet):
     assert err.count("|" + "#" * 24 + "|") == 16
 
 
-def test_scan_counts_taxels_that_were_touched_when_they_were_calibrated():
+@pytest.mark.parametrize(("threshold", "count"), [(12, 7), (0, 0)])
+def test_scan_counts_taxels_that_were_touched_when_they_were_calibrated(
+    threshold, count
+):
+    """Without a threshold nothing tells them from noise."""
     file = calibrated(skinfile.load(skinfile.shipped("mpr121")))
+    layout = replace(file.layout, threshold_counts=threshold)
+    file = replace(file, layout=layout)
     clock = VirtualClock()
     silence = np.zeros(file.layout.shape, np.uint16)
     buses = fake_buses(file, lambda t: silence, clock)
@@ -38,7 +44,7 @@ def test_scan_counts_taxels_that_were_touched_when_they_were_calibrated():
     with Skin(replace(file, calibration=calibration), buses, clock=clock) as skin:
         skin.start()
         skin.read()
-        assert below_rest(skin) == 7
+        assert below_rest(skin) == count
 
 
 def test_a_microcontroller_that_hangs_with_an_intact_frame_is_heard_of(
