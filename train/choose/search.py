@@ -142,7 +142,7 @@ def _searched(training: Floats, tested: Floats, k: int) -> tuple[Floats, Integer
     return squares, rows
 
 
-def _rounded(a: Floats, b: Floats) -> tuple[Floats, Floats]:
+def _rounded(a: Floats, b: Floats) -> Space:
     """Coordinates (n, c) and (m, c) in whole steps, so coarse that squared distances
     are exact.
 
@@ -180,9 +180,7 @@ class Decomposition:
         self._spectrum = Spectrum(rows)
         self._new = new
         self._labels = labels
-        self._along: dict[
-            tuple[str, tuple[float, ...]], list[tuple[Floats, Floats]]
-        ] = {}
+        self._along: dict[tuple[str, tuple[float, ...]], list[Space]] = {}
 
     def spaces(self, grid: SearchGrid, task: str) -> list[Space]:
         """[projection of a grid] the coordinates of training and new rows."""
@@ -210,7 +208,7 @@ class Decomposition:
         self,
         task: str,
         shrinkages: tuple[float, ...],
-    ) -> list[tuple[Floats, Floats]]:
+    ) -> list[Space]:
         """[shrinkage] coordinates (n, c) and (m, c) along the discriminants of a
         task's labels."""
         if (task, shrinkages) not in self._along:

@@ -78,11 +78,11 @@ class Recordings:
         has = [getattr(recording, part) is not None for recording in self.recordings]
         return self.part(has), tuple(compress(self.paths, map(not_, has)))
 
-    def part(self, kept: Sequence[bool]) -> Recordings:
+    def part(self, mask: Sequence[bool]) -> Recordings:
         """Some of them, by a mask (n,)."""
-        paths = tuple(compress(self.paths, kept))
+        paths = tuple(compress(self.paths, mask))
         return replace(
-            self, paths=paths, recordings=tuple(compress(self.recordings, kept))
+            self, paths=paths, recordings=tuple(compress(self.recordings, mask))
         )
 
 

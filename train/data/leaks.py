@@ -18,26 +18,26 @@ more than this share of the remainder."""
 
 
 def without_copies(recordings: Recordings) -> tuple[Recordings, list[str]]:
-    """Recordings without others' copies, by which they would be told, and a warning
-    where there are some. What has another label is no copy."""
+    """Recordings without copies of others, which would decide them, and a warning where
+    there are some. What has other labels, or no counts, is no copy."""
     originals: dict[bytes, Path] = {}
     copied = []
-    kept = []
+    is_original = []
     for path, recording in zip(recordings.paths, recordings.recordings, strict=True):
         sha = hashlib.sha256(recording.t.tobytes())
         sha.update(recording.frames.tobytes())
         sha.update(repr(sorted(recording.labels.items())).encode())
         original = originals.setdefault(sha.digest(), path)
-        kept.append(original is path or not recording.frames.any())
-        if not kept[-1]:
+        is_original.append(original is path or not recording.frames.any())
+        if not is_original[-1]:
             copied.append(f"{path} of {original}")
     if not copied:
         return recordings, []
     warning = (
-        f"warning: {len(copied)} of {len(kept)} recordings are copies, such as "
-        f"{copied[0]}; they are left out, as a copy is told by its original"
+        f"warning: {len(copied)} of {len(is_original)} recordings are copies, such as "
+        f"{copied[0]}; they are left out, as each would be decided by its original"
     )
-    return recordings.part(kept), [warning]
+    return recordings.part(is_original), [warning]
 
 
 def is_late(trial: Trial) -> bool:

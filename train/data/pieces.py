@@ -43,7 +43,8 @@ def joined(
     best, shares = most_accurate(datasets, accuracy)
     if best == 0:
         return dataset, []
-    near = [n * (shares[best] - share) <= FEWEST_GAINED for share in shares]
+    counted = n + len(dataset.untouched)
+    near = [counted * (shares[best] - share) <= FEWEST_GAINED for share in shares]
     place = near.index(True)
     release_s = longer_s[place - 1]
     return datasets[place], [

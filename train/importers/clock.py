@@ -36,12 +36,12 @@ class Order:
     """The frames that count, in the order of time.
 
     Attributes:
-        kept: (m,) indices of the frames.
+        frames: (m,) their indices.
         text: the change that was made, and steps as of a sparse log, in words; empty
             for times that increase steadily.
     """
 
-    kept: NDArray[np.intp]
+    frames: NDArray[np.intp]
     text: str
 
 
@@ -138,9 +138,9 @@ def angles_at(
     Raises:
         InputError: as `order`.
     """
-    kept = order(joints_t, where, frame, numbers).kept
-    joints_t = joints_t[kept]
-    unwrapped = np.unwrap(angles[kept], axis=0)
+    messages = order(joints_t, where, frame, numbers).frames
+    joints_t = joints_t[messages]
+    unwrapped = np.unwrap(angles[messages], axis=0)
     columns = [np.interp(t, joints_t, column) for column in unwrapped.T]
     at_frames = np.stack(columns, axis=1)
     gap_s = release_s

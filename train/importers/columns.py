@@ -74,7 +74,7 @@ class Meaning:
         return f"time in {self.unit} and {len(self.taxels)} taxels {self.taxels}"
 
     def text(self, label: str, shape: Sequence[int]) -> str:
-        """A line that says what was taken."""
+        """The columns used and ignored, in a line."""
         size = " x ".join(map(str, shape))
         text = f"taxels: {spanned(self.taxels)} ({len(self.taxels)}, as {size})"
         if self.time is not None:

@@ -83,7 +83,7 @@ class Samples:
         if not order.text:
             return self
         LOG.warning(f"{self.where}: {order.text}")
-        places = order.kept
+        places = order.frames
         joints = None if self.joints is None else self.joints[places]
         return replace(
             self, t=self.t[places], values=self.values[places], joints=joints
@@ -260,7 +260,7 @@ def _lacking(trials: Sequence[Samples], rest: Rest, codes: Sequence[float]) -> s
 
 def _say_missing(trials: Sequence[Samples], stand_in: float | None) -> list[float]:
     """Take away the values that stand for missing ones, and say how many are missing;
-    the others that stand alone as such values do, which are said."""
+    the numbers that stand alone as such values do, which it says too."""
     missing = 0
     for trial in trials:
         trial.values[trial.values == stand_in] = math.nan

@@ -3,7 +3,7 @@
 A folder holds a file for each trial: a row a frame, a column a taxel, and if you like
 columns of time and joint angles. Taxels are the columns whose names share a stem with
 running numbers (s1 to s16, taxel_0_3), all columns of a file without a header, or those
-that --taxels names; what was taken and what was ignored is printed. The label is the
+that --taxels names; the columns used and ignored are printed. The label is the
 name of the folder that the file lies in (or of the one above folders that only count
 trials), or else its own name without the number at the end; `labels.csv`, with the
 column `trial` and one for each task, replaces it. A single file with a column `trial`
@@ -86,7 +86,7 @@ def trials(
 ) -> Iterator[Trial | Refused]:
     """One recording for each file of a folder, or for each trial of a long table.
 
-    Prints what was taken.
+    Prints the columns used and ignored.
 
     Raises:
         InputError: there is no file, or one cannot be used with `--strict`.
@@ -113,7 +113,7 @@ def _recorded(
     options: TableOptions,
 ) -> Iterator[Trial | Refused]:
     """The recordings of trials, without those whose columns are not those of most of
-    them; prints what was taken."""
+    them; prints the columns used and ignored."""
     kind = mode(trial.meaning.kind for trial in measured)
     usable = [trial for trial in measured if trial.meaning.kind == kind]
     folder = path if path.is_dir() else path.parent
@@ -147,7 +147,7 @@ def _announced(
     skin: ConfigTable,
     options: TableOptions,
 ) -> tuple[int, int]:
-    """The rows and columns of the skin; prints what was taken, once for all files."""
+    """The rows and columns of the skin; prints the columns used and ignored, once for all files."""
     first = usable[0]
     taxels = len(first.meaning.taxels)
     in_skin = skin.whole("rows", 1), skin.whole("cols", taxels)

@@ -212,9 +212,10 @@ def _empty(lines: list[str], mark: str) -> Set[int]:
     return set(empty)
 
 
-def _lines_of_rows(kept: list[str], numbers: Sequence[int], mark: str) -> Sequence[int]:
-    """The line in the file of each row, whose cells may be quoted, by that of each line
-    kept.
+def _lines_of_rows(
+    lines: list[str], numbers: Sequence[int], mark: str
+) -> Sequence[int]:
+    """The line in the file of each row, whose cells may be quoted, by that of each line.
 
     Raises:
         InputError: a row has another width than the first one, but for a separator at
@@ -222,7 +223,7 @@ def _lines_of_rows(kept: list[str], numbers: Sequence[int], mark: str) -> Sequen
     """
     width = 0
     of_rows = array("q")
-    for place, row in _rows(kept, mark):
+    for place, row in _rows(lines, mark):
         line = numbers[place - 1]
         width = width or len(row)
         ends_in_mark = len(row) == width + 1 and not row[-1].strip()

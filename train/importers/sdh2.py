@@ -86,7 +86,7 @@ def _recording(root: ElementTree.Element, file: Path) -> Recording:
     if not frames:
         raise ValueError("it has no frame")
     t = (np.array(stamps) - stamps[0]) / 1000.0
-    places = clock.order(t, file).kept
+    places = clock.order(t, file).frames
     t = t[places]
     with_zero = np.pad(frames, ((0, 0), (0, 1)))
     rows, cols = pads.alive.shape

@@ -79,7 +79,8 @@ class NoveltyPoint:
 
     Attributes:
         mean: (p,) of each column.
-        gain: (p,) steps a unit; 0 for a feature that never changed in training.
+        gain: (p,) steps a unit; 0 for a column that never changed in training, or that
+            does not count.
         whitening: (components, components) whole numbers; a coordinate is the sum of
             products divided by 2^`shift`.
         shift: power of two.

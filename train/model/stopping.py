@@ -174,8 +174,8 @@ class SequentialClassifier:
         vectors = Vectors(X, y, self.features, self.widths)
         self._folds = folds
         self._tested = {task: (folds >= 0) & (y[task] != "") for task in self.choices}
-        taken = self._fit_points(vectors)
-        self._fit_novelty(taken, folds)
+        inputs = self._fit_points(vectors)
+        self._fit_novelty(inputs, folds)
         early = [{}] * len(fold_choices) if self.early is None else self.early.by_fold
         of_folds = list(map(self._at_points, fold_choices, early))
         of_all = [self.choices_at] * len(of_folds)
@@ -187,7 +187,7 @@ class SequentialClassifier:
             self.heading,
         )
         self.right_ = chosen_without.right
-        never_met = self._never_met(taken)
+        never_met = self._never_met(inputs)
         unseen = {task: never_met[task] for task in grouped if task in never_met}
         self.stopping_ = self._with_curves(
             self._certified(chosen_without), chosen_by_all, unseen

@@ -39,7 +39,7 @@ class Convergence:
         errors: the error of each step but the last, as a part of the peak force: root
             mean square over time of the force's distance from the reference run; of the
             worst trial.
-        change: the same of the reference run's distance from one of twice its step.
+        change: the same of the reference run's distance from the run before it.
         step_s: the largest step whose error is within the scene's tolerance. Where none
             is, as where an object bounces differently at each step, the largest step
             whose error is at most `LITTLE_GAIN` times the smallest.
@@ -150,13 +150,13 @@ def measure(
     }
 
 
-def _references(scene: Scene, kinds: Sequence[_Kind], tolerance: float) -> list[_Kind]:
+def _references(scene: Scene, kinds: list[_Kind], tolerance: float) -> list[_Kind]:
     """Runs of the kinds at halved steps, from the shortest tried or that which resolves
     a swing, until a halving is within the tolerance or the trials have `MOST_STEPS`."""
     shortest = scene.frame_count / scene.rate_hz / MOST_STEPS
     references = []
     work = []
-    for kind, swing_s in zip(kinds, _swing_steps(scene, list(kinds)), strict=True):
+    for kind, swing_s in zip(kinds, _swing_steps(scene, kinds), strict=True):
         reference = _Kind(kind.specs, kind.steps_s[-1:], kind.forces[-1:])
         references.append(reference)
         step_s = min(swing_s, 0.5 * kind.steps_s[-1])
@@ -164,9 +164,9 @@ def _references(scene: Scene, kinds: Sequence[_Kind], tolerance: float) -> list[
     while work:
         _run(scene, work, paced=False)
         work = [
-            (reference, 0.5 * reference.steps_s[-1])
+            (reference, 0.5 * step_s)
             for reference, step_s in work
-            if reference.change() > tolerance and step_s >= 2.0 * shortest
+            if not reference.change() <= tolerance and step_s >= 2.0 * shortest
         ]
     return references
 

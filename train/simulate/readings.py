@@ -28,7 +28,7 @@ class Readings:
         counts: (frames, rows, cols) of each taxel.
         joints: (frames, dof) radians.
         times: (frames,) seconds, if a clock effect shifts them.
-        kept: (frames,) whether each frame arrives, if some are lost.
+        arrives: (frames,) whether each frame arrives, if some are lost.
         valid: (rows, cols) whether each taxel works, if dead ones are known.
         images: {effect: (frames, rows, cols, images) further counts of each taxel} of
             the effects that have `IMAGES`.
@@ -42,7 +42,7 @@ class Readings:
     counts: NDArray[np.float32]
     joints: Array
     times: Array | None = None
-    kept: Mask | None = None
+    arrives: Mask | None = None
     valid: Mask | None = None
     images: dict[str, NDArray[np.float32]] = field(default_factory=dict)
 

@@ -51,19 +51,19 @@ def recordings(
     """(file name, recording) of each trial of a run, or of some; arguments as of
     `readings`."""
     for reading in readings(physics, which):
-        arrived = slice(None) if reading.kept is None else reading.kept
+        frames = slice(None) if reading.arrives is None else reading.arrives
         t = reading.t if reading.times is None else reading.times
         shear = reading.shear()
         file = file_name(reading.scene, reading.trial)
         yield (
             file,
             Recording(
-                t=t[arrived],
-                frames=reading.frames()[arrived],
-                joints=reading.joints[arrived],
+                t=t[frames],
+                frames=reading.frames()[frames],
+                joints=reading.joints[frames],
                 valid=reading.valid,
                 meta=_meta(reading, physics.trials.values, Path(file).stem),
-                shear=None if shear is None else shear[arrived],
+                shear=None if shear is None else shear[frames],
             ),
         )
 

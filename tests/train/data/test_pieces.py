@@ -1,5 +1,7 @@
 """Touches in pieces: contacts that last across gaps, where decisions gain from it."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -80,3 +82,18 @@ def test_a_release_that_is_asked_for_is_kept(saved):
 def test_nothing_is_tried_where_touches_are_whole(saved):
     dataset = load_trials([saved(gap=slice(140, 150))])
     assert joined(dataset, pytest.fail, pytest.fail) == (dataset, [])
+
+
+def test_a_gain_counts_recordings_without_a_touch_too(saved):
+    touched = load_trials([saved()])
+    dataset = replace(touched, untouched=touched.unused)
+    accuracies = {0.3: 0.9, 1.0: 1.0, 3.0: 1.0}
+
+    def with_release(release_s):
+        return replace(dataset, layout=replace(dataset.layout, release_s=release_s))
+
+    longer, (note,) = joined(
+        dataset, with_release, lambda data: accuracies[data.layout.release_s]
+    )
+    assert longer.layout.release_s == 1.0
+    assert "100.0% against 90.0% with 0.3 s" in note

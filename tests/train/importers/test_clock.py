@@ -9,7 +9,7 @@ from train.importers.clock import angles_at, order
 
 def test_a_time_within_the_jitter_puts_its_frame_in_its_place():
     result = order(np.array([0.0, 0.1, 0.2, 0.16, 0.3]), "a.csv")
-    assert result.kept.tolist() == [0, 1, 3, 2, 4]
+    assert result.frames.tolist() == [0, 1, 3, 2, 4]
     assert result.text == "1 time went back within the jitter"
 
 
@@ -30,7 +30,7 @@ def test_other_times_are_refused(times, sentence):
 def test_a_log_that_is_written_on_change_alone_is_said_to_be_sparse():
     t = np.cumsum([0.01, 0.7, 0.02, 0.9, 1.3, 0.01, 0.2, 0.01, 0.4, 0.01])
     result = order(t, "a.bag")
-    assert len(result.kept) == len(t)
+    assert len(result.frames) == len(t)
     assert result.text.startswith("its steps are 0.01 to 1.3 s, as of a log that")
 
 
@@ -38,8 +38,8 @@ def test_of_few_frames_at_one_time_the_later_counts():
     t = 0.01 * np.arange(200)
     t[50] = t[49]
     result = order(t, "a.bag")
-    assert 49 not in result.kept.tolist()
-    assert len(result.kept) == 199
+    assert 49 not in result.frames.tolist()
+    assert len(result.frames) == 199
     assert result.text == "1 frame skipped, as later ones have their times"
 
 

@@ -110,7 +110,7 @@ def test_these_trials_call_for_every_effect(plan):
 
 def bits(batch, i):
     """{name: bytes} of what a trial's recording is made of."""
-    names = ("times", "kept", "valid")
+    names = ("times", "arrives", "valid")
     arrays = {name: getattr(batch.all_readings[i], name) for name in names}
     arrays |= {name: getattr(batch, name)[i] for name in ("counts", "joints", "force")}
     return {name: a.tobytes() for name, a in arrays.items() if a is not None}

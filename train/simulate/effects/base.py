@@ -85,17 +85,19 @@ def place(t: Trials) -> None:
     t.contact.normal = normal * np.cos(yaw) + along * np.sin(yaw)
     t.contact.along_face = along * np.cos(yaw) - normal * np.sin(yaw)
     t.contact.face = point + skin.radius_m * normal
-    met = np.arctan2(dot(speed, pose.rotation[1]), dot(speed, pose.rotation[0]))
-    lay_columns(t, met)
+    front = np.arctan2(dot(speed, pose.rotation[1]), dot(speed, pose.rotation[0]))
+    lay_columns(t, front)
 
 
-def lay_columns(t: Trials, met: Array) -> None:
-    """Choose the columns that can touch an object met at an angle (m,) around the
+def lay_columns(t: Trials, front: Array) -> None:
+    """Choose the columns that can touch an object at the front, an angle (m,) around the
     forearm."""
     skin = t.scene.skin
     bed = t.bed
     angles = np.radians(np.array(skin.column_angles_deg))[:, None]
-    beside = angles - met - 2.0 * math.pi * np.rint((angles - met) / (2.0 * math.pi))
+    beside = (
+        angles - front - 2.0 * math.pi * np.rint((angles - front) / (2.0 * math.pi))
+    )
     away = np.abs(beside)
     window = len(bed.columns)
     first = np.argmin(away, axis=0) - window // 2

@@ -8,6 +8,6 @@ from train.simulate.readings import Readings
 
 def clock(readings: Readings) -> None:
     """Choose the frames that arrive; the first one always does."""
-    readings.kept = np.ones(len(readings.t), dtype=bool)
+    readings.arrives = np.ones(len(readings.t), dtype=bool)
     shares = readings.stream("dropped_frames").random(len(readings.t) - 1)
-    readings.kept[1:] = shares >= readings.scene.setting("dropped_frames", "part")
+    readings.arrives[1:] = shares >= readings.scene.setting("dropped_frames", "part")

@@ -2,7 +2,7 @@
 
 A stem that is pushed turns about its foot, away from the forearm's upper end, so it
 bears on the lowest row alone. Across the push stems stand evenly over the plant's
-breadth. Each is a line beside a cylinder: at a distance y of R or more it misses, and
+breadth. Each is a line beside a cylinder: at a distance y of more than R it misses, and
 otherwise meets the forearm at the angle asin(y / R), in the column there, and later by
 R (1 - cos). Turning about its foot it is stiffer the lower it is pushed, by the square
 of the height. This geometry is ours, and was fitted to nothing; how dense
@@ -28,10 +28,10 @@ def fill(t: Trials) -> None:
     sine = (state.along - 0.5) * t.values["breadth_m"] / skin.radius_m
     # One stem at least is met.
     sine[0] = np.clip(sine[0], -1.0, 1.0)
-    met = (np.abs(sine) <= 1.0) & (state.stiffness > 0.0)
-    angle = np.arcsin(np.where(met, sine, 0.0))
+    meets = (np.abs(sine) <= 1.0) & (state.stiffness > 0.0)
+    angle = np.arcsin(np.where(meets, sine, 0.0))
     depth = state.depth + skin.radius_m * (1.0 - np.cos(angle))
-    state.depth = depth - np.where(met, depth, np.inf).min(axis=0)
+    state.depth = depth - np.where(meets, depth, np.inf).min(axis=0)
     beside = np.abs(t.bed.column_angle[:, None] - angle)
     rows, window, _ = t.touch.image.shape
     state.taxel = max(rows - 2, 0) * window + beside.argmin(axis=0)
@@ -39,5 +39,5 @@ def fill(t: Trials) -> None:
     height = t.values["stem_height_m"]
     below = t.scene.place_m + t.values["place_m"] - t.contact.z
     stiffer = (height / (height - below)) ** 2
-    state.stiffness = np.where(met, state.stiffness * stiffer, 0.0)
-    state.damping = np.where(met, state.damping * np.sqrt(stiffer), 0.0)
+    state.stiffness = np.where(meets, state.stiffness * stiffer, 0.0)
+    state.damping = np.where(meets, state.damping * np.sqrt(stiffer), 0.0)

@@ -27,7 +27,7 @@ class Viscous(Group):
 
     Attributes:
         loss_s, ratio, relax_s: (n,) T, r and tau.
-        kept, let_go, late, damped: (n,) for the present step: e, r - s, s - e r and
+        decay, let_go, late, damped: (n,) for the present step: e, r - s, s - e r and
             T / h.
         force, before: (rows, n) F and w.
     """
@@ -35,7 +35,7 @@ class Viscous(Group):
     loss_s: Array
     ratio: Array
     relax_s: Array
-    kept: Array
+    decay: Array
     let_go: Array
     late: Array
     damped: Array
@@ -58,7 +58,7 @@ def tune(t: Trials) -> None:
     decay = np.where(relaxes, np.exp(-part), 0.0)
     rise = np.where(relaxes, ratio * (-np.expm1(-part) / part), 0.0)
     viscous.damped = damped
-    viscous.kept = decay
+    viscous.decay = decay
     viscous.let_go = ratio - rise
     viscous.late = rise - decay * ratio
     t.bed.gain = 1.0 + rise + damped
@@ -69,7 +69,7 @@ def bear_on(t: Trials) -> None:
     """Set the load with which each row's next step begins."""
     viscous = t.states["viscous"]
     late = viscous.late + viscous.damped
-    t.bed.load = -(viscous.kept * viscous.before + late * viscous.force)
+    t.bed.load = -(viscous.decay * viscous.before + late * viscous.force)
 
 
 def settle(t: Trials) -> None:
@@ -79,7 +79,7 @@ def settle(t: Trials) -> None:
     """
     viscous = t.states["viscous"]
     elastic = np.maximum((t.bed.row_force - t.bed.load) / t.bed.gain, 0.0)
-    pushed = viscous.kept * viscous.before + viscous.late * viscous.force
+    pushed = viscous.decay * viscous.before + viscous.late * viscous.force
     viscous.before = pushed + viscous.let_go * elastic
     viscous.force = elastic
     bear_on(t)
