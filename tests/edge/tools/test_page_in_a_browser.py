@@ -36,8 +36,8 @@ class View:
 
     def press(self, text):
         """Press the first button that is shown with this text."""
-        named = "b.offsetParent && b.textContent === arguments[0]"
-        button = f"[...document.querySelectorAll('button')].find(b => {named})"
+        condition = "b.offsetParent && b.textContent === arguments[0]"
+        button = f"[...document.querySelectorAll('button')].find(b => {condition})"
         self.js(f"{button}.click()", text)
 
     def write(self, selector, text):
