@@ -307,7 +307,7 @@ wheel-test: $(DEV) wheel
 	$(BIN)/python -m pytest tests/board/test_wheel.py
 
 c-test: $(DEV)
-	$(BIN)/python -m pytest tests/export/test_c_code.py -rs
+	$(BIN)/python -m pytest tests/export/test_c_code.py tests/export/test_c_graph.py -rs
 
 kernel-test: $(DEV)
 	$(BIN)/python -m pytest tests/board/test_kernel.py -rs --capture=tee-sys
@@ -316,7 +316,7 @@ $(VENV)/.browser: $(DEV)
 	$(PIP) --group browser
 	@touch $@
 
-BROWSED := tests/edge/tools/test_page.py tests/train/tradeoff/test_slider.py \
+BROWSED := tests/edge/tools/test_page_in_a_browser.py tests/train/tradeoff/test_slider.py \
   tests/train/report/test_page.py tests/train/study/test_study_report.py tests/test_site.py
 
 browser-test: $(VENV)/.browser $(VENV)/.docs

@@ -74,5 +74,5 @@ def test_each_picture_is_there_and_made_by_a_target(picture):
 
 def test_the_table_of_errnos_has_all_that_the_driver_answers():
     rows = re.findall(r"^\| (E[A-Z]+(?:, E[A-Z]+)*) \|", TEXT, re.M)
-    named = [name for row in rows for name in row.split(", ")]
-    assert sorted(getattr(errno, name) for name in named) == sorted(protocol.ERRORS)
+    names = [name for row in rows for name in row.split(", ")]
+    assert sorted(getattr(errno, name) for name in names) == sorted(protocol.ERRORS)

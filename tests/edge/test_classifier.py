@@ -53,8 +53,8 @@ def test_a_recordings_joints_may_stand_in_another_order(model, make_touch):
         return [e.decision.distances.tolist() for e in decided(model, recording)]
 
     recording = make_touch(seed=99)
-    named = {**recording.meta, "joint_names": list(model.info.chain.names[::-1])}
-    turned = replace(recording, joints=recording.joints[:, ::-1], meta=named)
+    meta = {**recording.meta, "joint_names": list(model.info.chain.names[::-1])}
+    turned = replace(recording, joints=recording.joints[:, ::-1], meta=meta)
     assert distances(turned) == distances(recording)
 
 

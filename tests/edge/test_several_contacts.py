@@ -133,14 +133,14 @@ print(decided, *sorted(set(sys.modules) - before))
 
 def test_the_first_decision_imports_little():
     """Importing in the midst of a decision takes a board a tenth of a second."""
-    done = subprocess.run(
+    process = subprocess.run(
         [sys.executable, "-c", FIRST],
         cwd=ROOT,
         capture_output=True,
         text=True,
         check=True,
     )
-    assert done.stdout.split() == ["3"]
+    assert process.stdout.split() == ["3"]
 
 
 MODEL = Model(demo.MODEL)

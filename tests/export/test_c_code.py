@@ -24,149 +24,26 @@ from edge.touch.feature import KERNELS
 from edge.touch.kernels import KernelTable, channels_of
 from edge.touch.layout import SkinLayout
 from export import c_code
-from export.build import smallest
-from export.c_graph import TYPES, CompiledGraph
-from export.graph import to_onnx
 from tests.conftest import ROOT, ended, export, in_a_row, touch
 from tests.edge.model.test_engines import hostile
 from tests.export.microcontroller import machine
+from tests.export.microcontroller.comparison import (
+    assert_same,
+    assert_same_events,
+    needs_gcc,
+    same,
+)
+from tests.export.microcontroller.recordings import (
+    damaged,
+    on_the_edges,
+    recordings_for,
+)
 from tests.export.test_early_stopping import pressed
-from tests.export.test_graph import fit, hard_set
-from tests.hard_cases.models import describe
-from train.model.pipeline import Choice
-from train.model.scaling import SCALINGS
 
-needs_gcc = pytest.mark.skipif(shutil.which("gcc") is None, reason="there is no gcc")
 TOOLS = ("arm-none-eabi-gcc", "qemu-system-arm")
 needs_qemu = pytest.mark.skipif(
     not all(map(shutil.which, TOOLS)), reason=f"there is no {' or no '.join(TOOLS)}"
 )
-
-
-def same(values, expected):
-    """Whether two arrays have the same bits, but for those of what is not a number."""
-    assert values.shape == expected.shape
-    both_nan = np.isnan(values) & np.isnan(expected)
-    return bool(((values == expected) | both_nan).all())
-
-
-def damaged(recording, rng):
-    """A recording with jitter, repeated times, lift-offs, frames that are lost, taxels
-    that cannot be read and poses that are not known."""
-    n = len(recording.t)
-    stays = rng.random(n) < 0.9
-    stays[0] = True
-    t = recording.t + rng.uniform(-0.004, 0.004, n)
-    t[rng.random(n) < 0.05] = np.nan
-    t = np.maximum.accumulate(np.where(np.isnan(t), recording.t[0], t))
-    frames = recording.frames.copy()
-    frames[rng.random(n) < 0.05] = 0
-    joints = recording.joints
-    if joints is not None:
-        joints = np.where(rng.random((n, 1)) < 0.05, np.nan, joints)[stays]
-    valid = rng.random(frames.shape) > 0.01
-    return replace(
-        recording, t=t[stays], frames=frames[stays], joints=joints, valid=valid[stays]
-    )
-
-
-def recordings_for(layout, count, rng):
-    """Noisy touches that wander over a skin, up to the largest counts."""
-    rows, cols = np.indices(layout.shape)
-    recordings = []
-    for _ in range(count):
-        n = int(rng.integers(30, 150))
-        frames = rng.integers(0, layout.threshold_counts + 1, (n, *layout.shape))
-        for _ in range(rng.integers(1, 4)):
-            row, col = rng.uniform(0, layout.shape)
-            force = rng.choice([300, 3000, 60000])
-            begin = int(rng.integers(0, n // 2))
-            for i in range(begin, int(rng.integers(begin + 3, n + 1))):
-                row, col = (row, col) + rng.normal(size=2) * (0.1, 0.4)
-                aside = np.abs(cols - col) % layout.cols
-                around = (
-                    np.minimum(aside, layout.cols - aside) if layout.wraps else aside
-                )
-                frames[i] += (force * np.exp(-((rows - row) ** 2 + around**2))).astype(
-                    int
-                )
-        t = np.arange(n) / 100.0 + rng.uniform(0, 50)
-        turns = rng.choice([0.05, 1e4])
-        joints = turns * rng.normal(size=(n, 5)).cumsum(axis=0)
-        frames = np.minimum(frames, 65535).astype(np.uint16)
-        meta = {"skin": layout.to_dict()}
-        recordings.append(damaged(Recording(t, frames, joints, meta=meta), rng))
-    return recordings
-
-
-def on_the_edges(layout):
-    """Contacts that stand on the edge of a comparison, from 0 s on."""
-    count = layout.onset + 100
-    frames = np.zeros((8, 140, *layout.shape), np.uint16)
-    t = np.tile(np.arange(140) / 100, (8, 1))
-    frames[0, :10, 2, 1] = layout.onset
-    frames[0, 10:, 2, 1] = layout.onset + 1
-    frames[1, :, 1, 1] = frames[1, :, 5, 3] = count  # equal regions
-    frames[2, :, 2, [0, 1, -1]] = count  # about the seam
-    frames[3, ::4, 2, 0] = frames[3, 1::4, 2, 0] = count  # half-way around and back
-    frames[3, 2::4, 2, layout.cols // 2] = frames[3, 3::4, 2, layout.cols // 2] = count
-    growing = count + np.arange(140)[:, None] * (3, 5, 7)
-    frames[4, :, [0, 3, 6], [0, 1, 2]] = growing.T  # on a line
-    frames[5:, :, 2, 1:3] = growing[:, 1:]
-    frames[5, [30, 60, 120]] = 0  # lifted off as a window ends
-    frames[6, 20] = 0  # as it is released
-    t[6, 20:] += layout.release_s - 0.01 - 5e-7
-    t[7, 1:] = np.arange(1, 140) * 0.6 / 39 + 5e-7  # as kernels are taken
-    joints = np.linspace(0, [2e5, -3e4, 1, 2, 3], 141)
-    # The frame before says that the touch was not under way.
-    t = np.insert(t, 0, -0.01, axis=1)
-    frames = np.insert(frames, 0, 0, axis=1)
-    valid = np.ones(frames[0].shape, bool)
-    valid[:, 0, 3] = False
-    more = {"joints": joints, "valid": valid, "meta": {"skin": layout.to_dict()}}
-    return [Recording(*of, **more) for of in zip(t, frames, strict=True)]
-
-
-def assert_same(model, folder, recordings, vectors=(), error=None, board=None):
-    """Ask C about vectors and recordings, and compare every bit with Python's answer."""
-    c_code.export(model, folder, error)
-    command = machine.compiled(folder, board)
-    last = len(model.decision_points_s) - 1
-    points = [last] if error is None else [*range(last + 1)]
-    questions = []
-    expected = []
-    for i, vector in enumerate(vectors):
-        point = i % len(points)
-        questions.append(machine.about_vector(point, vector))
-        expected.append(machine.outputs(model, points[point], vector))
-    for recording in recordings:
-        kind = machine.VECTORS_OF_RECORDING
-        questions.append(machine.about_recording(kind, recording))
-        expected.append(machine.vectors(model, points, recording))
-    assert same(machine.ask(command, folder, questions), np.concatenate(expected))
-    assert_same_events(model, folder, command, recordings, error)
-
-
-def assert_same_events(model, folder, command, recordings, error=None):
-    """Compare every bit of the events of recordings."""
-    kind = machine.EVENTS_OF_RECORDING
-    questions = [machine.about_recording(kind, recording) for recording in recordings]
-    rows = machine.ask(command, folder, questions).reshape(-1, 9)
-    ends = np.flatnonzero(rows[:, 0] == -1.0)
-    answers = np.split(rows, ends)[:-1]
-    for answer, recording in zip(answers, recordings, strict=True):
-        events = machine.events(model, recording, error)
-        assert same(ordered(answer[answer[:, 0] >= 0]), ordered(events))
-
-
-def ordered(events):
-    """By contact, kind and task: C decides a contact that has ended before its window
-    does, so its events come in another order, and never short."""
-    events = events.copy()
-    ended = events[events[:, 0] == 1, 1]
-    decided = np.isin(events[:, 1], ended) & (events[:, 0] == 2)
-    events[decided, 6] -= events[decided, 6] % 2
-    return events[np.lexsort((events[:, 2], events[:, 0], events[:, 1]))]
 
 
 @pytest.fixture(scope="module")
@@ -290,44 +167,6 @@ def test_a_microcontroller_has_the_same_bits(early, tmp_path, board):
     error = max(s.rules[-1].error for s in model.info.stopping.values())
     vectors = hostile(model.info.width, np.random.default_rng(3))
     assert_same(model, tmp_path, touches[::3], vectors, error, board)
-
-
-def hostile_blends(X, count, rng):
-    """Vectors of every kind: trained ones, blends of two and what lies beyond them, an
-    ulp beside these, and some with a number that is huge, tiny, infinite or none."""
-    first, second = X[rng.integers(0, len(X), (2, count))]
-    weights = rng.choice([0.0, 0.5, 1.0, 1.5, -1e4, 1e30], (count, 1))
-    vectors = first + weights * (second - first)
-    beside = np.nextafter(vectors, rng.choice([-np.inf, np.inf], vectors.shape))
-    vectors = np.where(rng.random((count, 1)) < 0.3, beside, vectors)
-    odd = rng.choice([np.nan, np.inf, -np.inf, 1e308, -1e308, 5e-324, -0.0], count)
-    rows = np.flatnonzero(rng.random(count) < 0.2)
-    vectors[rows, rng.integers(0, X.shape[1], len(rows))] = odd[rows]
-    return vectors
-
-
-@pytest.mark.slow
-@needs_gcc
-@pytest.mark.parametrize("seed", range(10))
-def test_a_random_models_graph_has_the_same_bits_of_hostile_vectors(tmp_path, seed):
-    """All trials may vote, each may have a label of its own, and tasks may lack some."""
-    rng = np.random.default_rng(seed)
-    kinds = "plain lattice duplicates outlier far".split()
-    X, queries = hard_set(kinds[seed % 5], rng)
-    choices = {}
-    for task in ("t", "some", "more")[: 1 + seed % 3]:
-        choices[task] = Choice(
-            str(rng.choice(SCALINGS)),
-            int(rng.integers(1, 25)),
-            int(rng.integers(1, len(X) // 2 + 1)),
-            str(rng.choice(["pca", "lda"])),
-        )
-    labels = int(rng.integers(2, len(X) + 1))
-    fitted = fit(X, choices, labels, lack=list(choices)[1:2])
-    path = tmp_path / "model.onnx"
-    path.write_bytes(to_onnx(fitted, describe(fitted, samples=8)))
-    vectors = [*queries, *hostile(24, rng), *hostile_blends(X, 500, rng)]
-    assert_same(Model(path), tmp_path / "c", [], vectors)
 
 
 SKINS = [
@@ -534,24 +373,3 @@ def test_a_file_in_the_folder_s_place_is_one_sentence(tmp_path):
     (tmp_path / "file").touch()
     with pytest.raises(InputError, match="cannot be written: .*file is a file"):
         c_code.export(Model(demo.MODEL), tmp_path / "file")
-
-
-def test_a_table_takes_the_smallest_type_that_holds_it():
-    for values, kind in (
-        ([0.0, -128.0], "int8"),
-        ([128.0], "int16"),
-        ([-32769.0], "int32"),
-        ([0.5, np.inf], "float32"),
-        ([0.1], "float64"),
-    ):
-        table = smallest(np.array(values), TYPES)
-        assert table.dtype.name == kind
-        assert table.tolist() == values
-
-
-def test_the_arena_is_shared_by_values_that_do_not_meet():
-    model = Model(demo.MODEL)
-    graph = CompiledGraph(model, model.outputs, [0], 0)
-    values = sum(len(step.outputs) * step.sizes[0] for step in graph.steps)
-    assert graph.arena < values / 3
-    assert graph.places["object_label"] < graph.arena

@@ -49,11 +49,11 @@ def differences(fitted, answers, queries):
     for task in fitted.choices:
         distances, rows = fitted.tasks_[task].neighbours(queries)
         nearest = fitted.tasks_[task].nearest(fitted.tasks_[task].squares(queries))
-        named = fitted.tasks_[task].labels[nearest]
+        labels = fitted.tasks_[task].labels[nearest]
         expected = {
             f"{task}_neighbours": rows,
-            f"{task}_label": vote(named),
-            f"{task}_scores": np.eye(len(fitted.tasks_[task].classes))[named].mean(
+            f"{task}_label": vote(labels),
+            f"{task}_scores": np.eye(len(fitted.tasks_[task].classes))[labels].mean(
                 axis=1
             ),
             f"{task}_distances": distances,

@@ -122,13 +122,13 @@ class Whole:
         classes = sorted(set(labels))
         X = self.X[point][members][:, space.columns]
         rows = exact.projected(X, space.projection).units
-        kept = task_fit.components
+        directions = task_fit.components
         unit = task_fit.unit
         scale = Fraction(unit) * Fraction(task_fit.slope)
         answers = []
         for query in points:
             k = CHOICES[task].k
-            near, squares = exact.nearest(rows[:, :kept], query[:kept], k)
+            near, squares = exact.nearest(rows[:, :directions], query[:directions], k)
             votes = [labels[i] for i in near]
             answers.append(
                 (
@@ -140,8 +140,8 @@ class Whole:
                 )
             )
         columns_of = zip(*answers, strict=True)
-        named = zip(TASK_OUTPUTS, columns_of, strict=True)
-        return {f"{task}_{end}": np.array(column) for end, column in named}
+        pairs = zip(TASK_OUTPUTS, columns_of, strict=True)
+        return {f"{task}_{end}": np.array(column) for end, column in pairs}
 
 
 def _far(label, labels, squares, scale):

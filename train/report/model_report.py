@@ -394,8 +394,8 @@ def _sizes(exported: Exported) -> Section:
         "for features and decision together on this machine; `edge-classify bench` "
         "measures those of a board. A star marks the candidate chosen for a task, "
         "which is the smallest one within a standard error of the best, or among fewer "
-        "than 100 single trials the most accurate. A candidate without a number was "
-        "dropped after a few folds, as behind or no better than a cheaper one."
+        "than 200 single trials the one with the best grades. A candidate without a "
+        "number was dropped after a few folds, as behind or no better than a cheaper one."
     ]
     return Section(
         "Candidates, sizes and times",

@@ -240,8 +240,8 @@ def test_a_single_taxel_or_a_small_drift_is_calibrated(
 ):
     status, _, err = measured(leant(counts, taxels))
     assert status == 0
-    named = "taxel [5, 5] rests 120 counts off the former calibration" in err
-    assert named == (len(taxels) == 1)
+    is_named = "taxel [5, 5] rests 120 counts off the former calibration" in err
+    assert is_named == (len(taxels) == 1)
 
 
 def test_taxels_side_by_side_stand_out_of_a_skin_that_rests_at_0():

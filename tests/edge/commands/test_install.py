@@ -143,8 +143,8 @@ def test_golden_files_of_models_that_are_gone_are_removed(installed, new, runnin
         new.write_bytes(sealed(model))
         installed()
         versions.append(Model(new).version)
-    left = {path.name for path in running.parent.glob("golden-*.npz")}
-    assert left == {f"golden-{version}.npz" for version in versions[1:]}
+    names = {path.name for path in running.parent.glob("golden-*.npz")}
+    assert names == {f"golden-{version}.npz" for version in versions[1:]}
 
 
 def test_a_model_that_is_installed_twice_is_not_its_own_way_back(installed, running):

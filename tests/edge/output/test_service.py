@@ -60,8 +60,8 @@ def examples():
     """The arguments in the unit's environment file: those that hold, and those in a
     comment."""
     lines = UNIT.with_suffix(".env").read_text().splitlines()
-    named = [line.lstrip("#").partition("=") for line in lines]
-    return [value for name, _, value in named if name == "ARGUMENTS"]
+    pairs = [line.lstrip("#").partition("=") for line in lines]
+    return [value for name, _, value in pairs if name == "ARGUMENTS"]
 
 
 def test_the_units_command_with_and_without_an_arm_is_one_that_edge_classify_takes(
@@ -75,8 +75,8 @@ def test_the_units_command_with_and_without_an_arm_is_one_that_edge_classify_tak
     )
     assert without.joints is None
     assert arm.joints == "udp:47401"
-    kept = Path("/var/lib") / unit["Service"]["StateDirectory"] / "kept"
-    assert arm.keep == kept
+    folder = Path("/var/lib") / unit["Service"]["StateDirectory"] / "kept"
+    assert arm.keep == folder
 
 
 def test_the_unit_restarts_for_ever_but_not_after_a_mistake(unit):

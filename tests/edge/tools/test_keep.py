@@ -50,10 +50,10 @@ def test_a_kept_touch_has_the_decision_and_is_decided_again_as_it_was(edge, tmp_
     assert status == 0
     assert "1 recording kept" in err
     (path,) = (tmp_path / "kept").glob("kept-*.npz")
-    kept = load(path)
-    assert kept.labels == {}
-    assert kept.joints is not None
-    answers = kept.meta["decided"]
+    touch = load(path)
+    assert touch.labels == {}
+    assert touch.joints is not None
+    answers = touch.meta["decided"]
     assert list(answers) == decided(lines, "task")
     for key in ("label", "confidence", "flags"):
         assert [answer[key] for answer in answers.values()] == decided(lines, key)

@@ -1,8 +1,6 @@
 """The live page shows frames, contacts and decisions, and relabels and deletes
 trials."""
 
-import shutil
-from contextlib import ExitStack, closing
 from dataclasses import replace
 
 import numpy as np
@@ -12,19 +10,8 @@ import edge
 from edge import demo
 from edge.errors import InputError
 from edge.events import Decided, Onset
-from edge.tools.page import Page
 from edge.touch.frame import Frame
-from edge.touch.layout import SkinLayout
-from tests.browser import chromium, violations
-from tests.edge.tools.kept import kept_meta
-
-LAYOUT = SkinLayout(
-    rows=4,
-    cols=6,
-    threshold_counts=100,
-    dead=(5,),
-    counts_per_newton=1000.0,
-)
+from tests.edge.tools.conftest import TOUCH, frames
 
 
 @pytest.fixture
@@ -34,35 +21,6 @@ def pictures(monkeypatch):
     monkeypatch.setattr("edge.tools.web.WebServer.watched", True)
     monkeypatch.setattr("edge.tools.web.WebServer.show", lambda _, x: shows.append(x))
     return shows
-
-
-@pytest.fixture
-def serve(tmp_path):
-    """Serve a page of the folder `tmp_path`, with further options."""
-    with ExitStack() as stack:
-
-        def run(layout=LAYOUT, **options):
-            options = {"folder": tmp_path, **options}
-            page = Page("127.0.0.1:0", layout, title="pad", **options)
-            stack.enter_context(closing(page.server))
-            return page
-
-        yield run
-
-
-@pytest.fixture
-def page(serve):
-    return serve()
-
-
-def frames(count=10_000, touched_from=0):
-    for i in range(count):
-        image = np.zeros((4, 6), np.uint16)
-        if i >= touched_from:
-            image[1, 2:4] = 500, 600
-        valid = np.ones((4, 6), bool)
-        valid[3, 0] = False
-        yield Frame(counts=image, valid=valid, t=i * 0.05)
 
 
 @pytest.fixture
@@ -181,7 +139,6 @@ def test_a_page_without_a_folder_changes_nothing(serve):
 
 
 SPONGE = {"files": ["a.npz"], "labels": {"object": "sponge"}}
-TOUCH = edge.load(demo.FOLDER / "foam-block-fixed.npz")
 
 
 @pytest.fixture
@@ -227,25 +184,6 @@ def test_a_trial_that_is_gone_takes_no_former_change_away(folder_page, tmp_path)
     assert (tmp_path / "a.npz").read_bytes() == before
 
 
-@pytest.fixture
-def kept(tmp_path):
-    """A folder with a touch that was kept because its decision was unsure."""
-    meta = {**TOUCH.meta, **kept_meta({}, softness=("hard", 0.55, "short"))}
-    edge.save(tmp_path / "kept-1.npz", replace(TOUCH, meta=meta))
-    return tmp_path
-
-
-@pytest.fixture
-def another(kept):
-    """Keep another touch."""
-    return lambda: shutil.copy(kept / "kept-1.npz", kept / "kept-2.npz")
-
-
-@pytest.fixture
-def kept_page(kept, serve):
-    return serve(choices={"softness": ["soft", "hard"]}, decides=True)
-
-
 def test_a_kept_touch_has_its_course_its_decision_and_what_asks_for_a_look(kept_page):
     (touch,) = act(kept_page, "trials")["trials"]
     assert touch["file"] == "kept-1.npz"
@@ -255,15 +193,15 @@ def test_a_kept_touch_has_its_course_its_decision_and_what_asks_for_a_look(kept_
     assert max(touch["curve"]) == 100
 
 
-def test_a_decision_is_accepted_and_corrected_with_undo(kept_page, kept):
+def test_a_decision_is_accepted_and_corrected_with_undo(kept_page, touch_folder):
     act(kept_page, "accept", files=["kept-1.npz"])
-    assert edge.load(kept / "kept-1.npz").labels == {"softness": "hard"}
+    assert edge.load(touch_folder / "kept-1.npz").labels == {"softness": "hard"}
     act(kept_page, "relabel", files=["kept-1.npz"], labels={"softness": "soft"})
     (touch,) = act(kept_page, "trials")["trials"]
     assert touch["labels"] == {"softness": "soft"}
     assert touch["kinds"] == ["unsure", "wrong"]
     act(kept_page, "undo")
-    assert edge.load(kept / "kept-1.npz").labels == {"softness": "hard"}
+    assert edge.load(touch_folder / "kept-1.npz").labels == {"softness": "hard"}
 
 
 def test_a_touch_says_what_there_is_to_accept(kept_page):
@@ -275,18 +213,18 @@ def test_a_touch_says_what_there_is_to_accept(kept_page):
 
 
 def test_several_touches_change_at_once_and_one_undo_takes_all_back(
-    kept_page, kept, another
+    kept_page, touch_folder, add_touch
 ):
-    another()
+    add_touch()
     names = files(kept_page)
     act(kept_page, "relabel", files=names, labels={"object": "sponge"})
     act(kept_page, "accept", files=names)
     both = {"object": "sponge", "softness": "hard"}
-    assert [edge.load(kept / name).labels for name in names] == [both, both]
+    assert [edge.load(touch_folder / name).labels for name in names] == [both, both]
     act(kept_page, "delete", files=names)
     assert files(kept_page) == []
     act(kept_page, "undo")
-    assert [edge.load(kept / name).labels for name in names] == [both, both]
+    assert [edge.load(touch_folder / name).labels for name in names] == [both, both]
 
 
 def test_a_contradiction_and_a_slip_are_told_where_the_label_is(folder_page, tmp_path):
@@ -299,24 +237,26 @@ def test_a_contradiction_and_a_slip_are_told_where_the_label_is(folder_page, tmp
     act(folder_page, "labels", labels={"object": "Foam block"})
     listed = act(folder_page, "trials")
     names = [touch["file"] for touch in listed["trials"]]
-    told = dict(zip([*names, "next"], listed["doubts"], strict=True))
-    assert told["a.npz"] == [
+    doubts = dict(zip([*names, "next"], listed["doubts"], strict=True))
+    assert doubts["a.npz"] == [
         "category='rigid-fixed' contradicts softness and mobility, which say "
         "'soft-fixed'",
         "object='fom block': is it 'foam block'?",
     ]
-    assert told["b.npz"] == []
-    assert told["next"] == ["object='Foam block': is it 'foam block'?"]
+    assert doubts["b.npz"] == []
+    assert doubts["next"] == ["object='Foam block': is it 'foam block'?"]
 
 
 def files(page):
     return [touch["file"] for touch in act(page, "trials")["trials"]]
 
 
-def test_touches_that_come_into_the_folder_are_shown(kept_page, kept, another):
-    another()
+def test_touches_that_come_into_the_folder_are_shown(
+    kept_page, touch_folder, add_touch
+):
+    add_touch()
     assert files(kept_page) == ["kept-1.npz", "kept-2.npz"]
-    (kept / "kept-1.npz").unlink()
+    (touch_folder / "kept-1.npz").unlink()
     assert files(kept_page) == ["kept-2.npz"]
 
 
@@ -327,211 +267,3 @@ def test_a_picture_tells_when_the_list_has_changed(folder_page, pictures):
     folder_page.push(replace(still, t=1.0))
     before, after = (picture["trials"] for picture in pictures)
     assert after > before
-
-
-class View:
-    """A page in headless Chromium, whose frames go on while something is waited for."""
-
-    def __init__(self, page, browser, stream, events):
-        self.page = page
-        self.browser = browser
-        self.stream = stream
-        self.events = events
-
-    def js(self, expression, *arguments):
-        return self.browser.execute_script(f"return {expression}", *arguments)
-
-    def until(self, condition):
-        for _ in range(400):
-            self.page.push(next(self.stream), self.events)
-            self.js("1")
-            if condition():
-                return
-        raise AssertionError("it never came")
-
-    def has(self, expression):
-        """Wait for a condition in JavaScript."""
-        self.until(lambda: self.js(expression))
-
-    def press(self, text):
-        """Press the first button that is shown with this text."""
-        named = "b.offsetParent && b.textContent === arguments[0]"
-        button = f"[...document.querySelectorAll('button')].find(b => {named})"
-        self.js(f"{button}.click()", text)
-
-    def write(self, selector, text):
-        self.browser.find_element("css selector", selector).send_keys(text)
-
-
-@pytest.fixture
-def view():
-    """Open a page in a window of a width; all windows show one stream of frames."""
-    stream = frames()
-    with ExitStack() as stack:
-
-        def run(page, width=390, events=()):
-            browser = stack.enter_context(chromium(width, page.server.link))
-            return View(page, browser, stream, events)
-
-        yield run
-
-
-ROWS = "document.querySelectorAll('#trials > li')"
-
-
-class TestInABrowser:
-    """What a person sees and does there."""
-
-    def test_the_picture_moves_and_has_a_scale(self, page, view):
-        images = set()
-        shown = view(page)
-
-        def moved():
-            images.add(shown.js("document.getElementById('skin').toDataURL()"))
-            return len(images) > 1
-
-        shown.until(moved)
-        canvases = shown.browser.find_elements("css selector", "canvas")
-        assert all(canvas.get_attribute("aria-label") for canvas in canvases)
-        assert {canvas.get_attribute("role") for canvas in canvases} == {"img"}
-        assert "0.1 to 17 newtons" in shown.browser.find_element("id", "scale").text
-
-    def test_a_label_applies_when_it_is_chosen_and_every_browser_shows_it(
-        self, page, view
-    ):
-        first = view(page)
-        second = view(page)
-        label = "document.querySelector('#choices fieldset input')?.value"
-        second.has(f"{label} === ''")
-        first.has(f"{label} === ''")
-        first.write("#choices fieldset input", "box\n")
-        second.has(f"{label} === 'box'")
-        assert page.labels == {"object": "box"}
-        second.press("Record")
-        second.until(lambda: page.recording)
-        assert page.labels == {"object": "box"}
-
-    def test_a_label_for_an_old_touch_leaves_those_of_the_next(
-        self, serve, tmp_path, view
-    ):
-        edge.save(tmp_path / "a.npz", TOUCH)
-        page = serve(labels={"object": "foam"})
-        shown = view(page, 1200)
-        shown.has(f"{ROWS}.length === 1")
-        shown.press("Relabel")
-        shown.write(".editor [aria-label='new label for object']", "sponge")
-        shown.press("Save")
-        labels = {**TOUCH.labels, "object": "sponge"}
-        shown.until(lambda: edge.load(tmp_path / "a.npz").labels == labels)
-        shown.has("document.querySelector('.editor') === null")
-        assert page.labels == {"object": "foam"}
-        told = shown.js("document.getElementById('recording').textContent")
-        assert told == "Each touch is saved as object=foam."
-        shown.js("scrollTo(0, 10000)")
-        top = shown.js("document.getElementById('recording').getBoundingClientRect().y")
-        assert 0 <= top < 20
-
-    def test_several_touches_get_a_label_that_the_model_does_not_know(
-        self, kept_page, another, view
-    ):
-        another()
-        shown = view(kept_page, 1200)
-        shown.has(f"{ROWS}.length === 2")
-        shown.js("document.getElementById('all').click()")
-        shown.press("Label")
-        shown.write(".editor [aria-label='new label for softness']", "squashy")
-        shown.press("Save")
-        squashy = f"[...{ROWS}].every(row => row.textContent.includes('=squashy'))"
-        shown.has(squashy)
-
-    def test_new_touches_move_neither_rows_nor_focus(self, kept_page, another, view):
-        shown = view(kept_page, 1200)
-        shown.has(f"{ROWS}.length === 1")
-        shown.js("document.querySelector('#trials button').focus()")
-        button = shown.browser.switch_to.active_element
-        height = button.rect["y"]
-        another()
-        kept_page.look()
-        shown.has(f"{ROWS}.length === 2")
-        assert shown.browser.switch_to.active_element == button
-        assert button.rect["y"] == height
-        shown.press("Accept")
-        shown.has(f"{ROWS}[0].textContent.includes('softness=hard')")
-        assert shown.js("document.activeElement.closest('li').dataset.file") == (
-            "kept-1.npz"
-        )
-
-    def test_only_decisions_are_read_out_and_only_when_they_change(
-        self, kept_page, view
-    ):
-        decided = Decided("softness", "hard", 0.8, 1.2, 0.1, 0.3, ())
-        regions = "[...document.querySelectorAll('[aria-live],[role=status]')]"
-        shown = view(kept_page, events=[decided])
-        shown.has("document.querySelector('.decision') !== null")
-        assert shown.js(f"{regions}.map(node => node.id)") == ["decisions"]
-        shown.js("(document.querySelector('.decision').marked = true)")
-        version = shown.js("latest.t")
-        shown.has(f"latest.t > {version}")
-        assert shown.js("document.querySelector('.decision').marked")
-
-    def test_a_kept_touch_is_filtered_corrected_and_undone(self, kept_page, kept, view):
-        shown = view(kept_page)
-
-        def narrow(kind):
-            shown.js(
-                "(f => { f.value = arguments[0]; f.onchange(); })"
-                "(document.getElementById('filter'))",
-                kind,
-            )
-
-        def labels():
-            return edge.load(kept / "kept-1.npz").labels
-
-        shown.has(f"{ROWS}.length === 1")
-        text = shown.js(f"{ROWS}[0].textContent")
-        assert "softness: hard (55 %, short)" in text
-        assert "unsure" in text
-        narrow("wrong")
-        shown.has(f"{ROWS}.length === 0")
-        narrow("")
-        shown.press("Correct")
-        assert violations(shown.browser) == []
-        shown.write("body", "1")
-        shown.has("document.querySelector('.editor [aria-pressed=true]') !== null")
-        shown.press("Save")
-        shown.until(lambda: labels() == {"softness": "soft"})
-        shown.has("document.getElementById('undo').offsetParent !== null")
-        shown.press("Undo the change of kept-1.npz")
-        shown.until(lambda: labels() == {})
-
-    def test_a_message_goes_by_a_press_or_after_a_while(self, page, view):
-        page.notice("chip 1 failed")
-        shown = view(page)
-        notices = "document.querySelectorAll('#notices li').length"
-        shown.has(f"{notices} === 1")
-        shown.js("document.querySelector('#notices button').click()")
-        assert shown.js(notices) == 0
-        shown.js("(window.setTimeout = queueMicrotask)")
-        page.notice("chip 1 failed")
-        page.notice("chip 2 failed")
-        shown.until(lambda: len(shown.js("notices")) == 3)
-        assert shown.js(notices) == 0
-
-    def test_on_a_phone_labels_are_in_reach_and_names_break_between_words(
-        self, tmp_path, view, serve
-    ):
-        edge.save(tmp_path / "kept-n000001-20261127T170000-123456.npz", TOUCH)
-        shown = view(serve(labels={"object": "box"}))
-        shown.has(f"{ROWS}.length === 1")
-        box = "document.querySelector('#choices input').getBoundingClientRect()"
-        assert shown.js(f"{box}.bottom") < 400
-        over = f"document.elementFromPoint({box}.x + 9, {box}.y + 9).tagName"
-        assert shown.js(over) == "INPUT"
-        lines = shown.js(
-            "[...document.querySelectorAll('#trials .near, #trials strong')]"
-            ".flatMap(node => [...node.childNodes]).map(node => {"
-            "const range = document.createRange(); range.selectNode(node);"
-            "return [node.textContent, range.getClientRects().length]; })"
-        )
-        assert [text for text, count in lines if " " not in text and count > 1] == []
-        assert shown.js("document.documentElement.scrollWidth") == 390

@@ -174,12 +174,12 @@ def test_an_address_that_cannot_be_bound_is_one_sentence(address):
 
 
 def test_named_angles_are_put_in_the_arms_order():
-    named = Wire(names=("shoulder", "elbow"))
-    named.send(5.0, [0.3, 9.0, 0.1], names=["elbow", "wheel", "shoulder"])
-    assert named.at() == [0.1, 0.3]
-    named.send(5.01, [0.2, 0.4])
-    named.now = 0.01
-    assert named.at() == [0.2, 0.4]
+    wire = Wire(names=("shoulder", "elbow"))
+    wire.send(5.0, [0.3, 9.0, 0.1], names=["elbow", "wheel", "shoulder"])
+    assert wire.at() == [0.1, 0.3]
+    wire.send(5.01, [0.2, 0.4])
+    wire.now = 0.01
+    assert wire.at() == [0.2, 0.4]
 
 
 @pytest.mark.parametrize(
@@ -194,10 +194,10 @@ def test_named_angles_are_put_in_the_arms_order():
     ],
 )
 def test_names_that_do_not_suit_are_refused(q, names, problem):
-    named = Wire(names=("shoulder", "elbow"))
-    named.send(5.0, q, names=names)
-    assert named.at() is None
-    assert named.joints.problem.startswith(problem)
+    wire = Wire(names=("shoulder", "elbow"))
+    wire.send(5.0, q, names=names)
+    assert wire.at() is None
+    assert wire.joints.problem.startswith(problem)
 
 
 @pytest.mark.parametrize("ahead_s", [0.03, 100.0])

@@ -26,9 +26,9 @@ def weaker(recording, share, **skin):
     """With a share of its force, and other thresholds; an entry of None is taken
     out."""
     skin = {**recording.meta["skin"], **skin}
-    kept = {key: value for key, value in skin.items() if value is not None}
+    present = {key: value for key, value in skin.items() if value is not None}
     frames = (recording.frames * share).astype(np.uint16)
-    return replace(recording, frames=frames, meta={**recording.meta, "skin": kept})
+    return replace(recording, frames=frames, meta={**recording.meta, "skin": present})
 
 
 def test_the_proposal_lies_above_the_noise_and_finds_every_contact(make_touch):

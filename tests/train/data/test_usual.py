@@ -37,9 +37,9 @@ def test_labels_of_the_task_with_most_labels_often_have_a_second_region():
 def test_the_standstill_and_the_speeds_are_those_of_nearly_all_trials():
     trials = [touch(speed, rest=4) for speed in np.linspace(1.0, 2.0, 101)]
     trials.append(touch(np.nan))
-    found = usual({"object": ["box"] * 102}, trials)
-    assert found["still_s"] == pytest.approx((0.0, 0.4))
-    assert found["speeds"] == pytest.approx((1.01 * SLOWER, 1.99 * FASTER + RESTS))
+    limits = usual({"object": ["box"] * 102}, trials)
+    assert limits["still_s"] == pytest.approx((0.0, 0.4))
+    assert limits["speeds"] == pytest.approx((1.01 * SLOWER, 1.99 * FASTER + RESTS))
 
 
 def test_without_joint_angles_nothing_is_said_of_them():

@@ -51,15 +51,15 @@ def test_what_would_be_guessed_is_asked(stored, sentence):
 def test_an_axis_that_is_named_is_taken():
     square = np.arange(36).reshape(6, 6)
     stored = {"a": square, "b": np.ones((6, 2))}
-    named = TableOptions(axis=2, taxels="a")
-    table = table_of("a.mat", stored, named)
+    options = TableOptions(axis=2, taxels="a")
+    table = table_of("a.mat", stored, options)
     assert table.data.to_numpy().tolist() == square.T.tolist()
 
 
 def test_the_array_that_is_named_as_the_time_tells_the_frames():
     stored = {"clock": np.arange(6.0), "a": np.ones((6, 4)), "b": np.ones((4, 6))}
-    named = TableOptions(time="clock")
-    assert len(table_of("a.mat", stored, named).data) == 6
+    options = TableOptions(time="clock")
+    assert len(table_of("a.mat", stored, options).data) == 6
 
 
 def test_an_array_of_rows_and_columns_tells_the_shape():

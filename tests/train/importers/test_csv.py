@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 from scipy.io import savemat
 
 from edge.recording import load
+from tests.conftest import python
 from train.__main__ import main
 from train.importers.csv import PANDAS
 
@@ -113,12 +114,12 @@ def test_a_file_of_values_by_their_sensors_is_a_trial(folder):
     assert recordings["cup_1"].frames.tolist() == [[[0, 1]], [[100, 101]]]
 
 
-def test_the_lines_of_pandas_make_a_recording(folder, refused, monkeypatch):
+def test_the_lines_of_pandas_make_a_recording(folder, refused):
     put(folder, {"cup_1.csv": "t,thumb,index\n0,1,2\n0.1,3,4\n"})
     refused("csv", folder)
-    monkeypatch.chdir(folder)
-    exec(PANDAS.partition("\n")[2].replace('"s1", "s2"', '"thumb", "index"'))
-    assert load("cup_1.npz").frames.tolist() == [[[1, 2]], [[3, 4]]]
+    program = PANDAS.partition("\n")[2].replace('"s1", "s2"', '"thumb", "index"')
+    python("-c", program, cwd=folder)
+    assert load(folder / "cup_1.npz").frames.tolist() == [[[1, 2]], [[3, 4]]]
 
 
 def test_the_first_frame_of_a_folder_is_the_earliest(folder):

@@ -83,7 +83,8 @@ def test_a_curve_of_a_point_has_the_mean_of_the_honest_answers_there():
     right, honest = rng.random((2, 2, 80)) < [[[0.9]], [[0.6]]]
     evidence = Evidence(*numbers[:2], right, honest, 0.8 + 0.2 * numbers[2])
     for point in range(2):
-        margins, excess = numbers[:2, point]
+        margins = evidence.margins[point]
+        excess = evidence.excess[point]
         mean = honest[point].mean(), evidence.known[point]
         curve = Curve.of(margins, excess, right[point])
         assert evidence.at(point).curve() == curve.with_mean(margins, excess, *mean)

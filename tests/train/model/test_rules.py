@@ -130,16 +130,16 @@ class TestProduct:
         assert at.tolist() == [0, 0]
         assert wrong.all()
 
-    def agreeing(self, own, *rules):
+    def agreeing(self, strict, *rules):
         """The rules of the product and of its fast factor, that has one of its own."""
-        known = {"fast": [own, StoppingRule(0.25, 0.3, 0.6, 2)], "slow": []}
+        factors = {"fast": [strict, StoppingRule(0.25, 0.3, 0.6, 2)], "slow": []}
         courses = {
             "fast": course(self.FAST, self.WRONG),
             "slow": course(self.SLOW, self.WRONG),
             "product": self.product(),
         }
         by_task = agreeing(
-            "product", known, {"product": rules, **known}, courses, SECONDS
+            "product", factors, {"product": rules, **factors}, courses, SECONDS
         )
         return by_task["product"], by_task["fast"]
 
@@ -147,32 +147,32 @@ class TestProduct:
         self,
     ):
         sure = StoppingRule(0.3, 1.0, 0.7, 2)
-        own = StoppingRule(0.1, 1.2, NEVER, 2)
+        strict = StoppingRule(0.1, 1.2, NEVER, 2)
         window = StoppingRule(0.2, 1.2, NEVER, 2)
-        product, factor = self.agreeing(own, window, sure)
+        product, factor = self.agreeing(strict, window, sure)
         assert product == [window, sure]
-        assert factor == [own, window, replace(sure, mean_s=0.4)]
+        assert factor == [strict, window, replace(sure, mean_s=0.4)]
 
     def test_a_factor_is_never_slower_at_a_looser_error(self):
         """The product has the rules that both follow."""
-        own = StoppingRule(0.1, 0.4, 0.8, 2)
+        strict = StoppingRule(0.1, 0.4, 0.8, 2)
         window = StoppingRule(0.2, 1.2, NEVER, 2)
         slow = StoppingRule(0.3, 1.2, 0.95, 2)
         fast = StoppingRule(0.4, 1.0, 0.7, 2)
-        product, factor = self.agreeing(own, window, slow, fast)
+        product, factor = self.agreeing(strict, window, slow, fast)
         assert product == [fast]
-        assert factor == [own, replace(fast, mean_s=0.4)]
+        assert factor == [strict, replace(fast, mean_s=0.4)]
 
     def test_a_product_that_no_factor_follows_has_the_errors_of_both(self):
-        own = StoppingRule(0.1, 0.4, 0.8, 2)
+        strict = StoppingRule(0.1, 0.4, 0.8, 2)
         slow = StoppingRule(0.2, 1.2, 0.95, 2)
-        product, factor = self.agreeing(own, slow)
-        assert factor == [own]
+        product, factor = self.agreeing(strict, slow)
+        assert factor == [strict]
         wrong = self.product().under(slow)[1]
         limit = upper_limit(int(wrong.sum()), 2, 0.025)
         assert product == [StoppingRule(limit, 1.2, NEVER, 2)]
-        window = StoppingRule(own.error, 1.2, NEVER, 2)
-        _, factor = self.agreeing(own, window)
+        window = StoppingRule(strict.error, 1.2, NEVER, 2)
+        _, factor = self.agreeing(strict, window)
         assert factor == [window]
 
 

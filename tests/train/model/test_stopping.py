@@ -126,8 +126,8 @@ def test_trials_without_a_fold_calibrate_nothing():
 
 def test_trials_that_are_copies_set_no_limit():
     X, labels = touches(60)
-    kept = [*range(60), *range(40)]
-    copied = calibrated(of_neighbours(3), X[:, kept], {"t": labels[kept]})
+    rows = [*range(60), *range(40)]
+    copied = calibrated(of_neighbours(3), X[:, rows], {"t": labels[rows]})
     single = calibrated(of_neighbours(3), X, {"t": labels})
     ratio = np.divide(copied.novelty_.typical, single.novelty_.typical)
     assert ratio.min() > 0.3
@@ -188,5 +188,5 @@ def test_a_kind_is_no_name_though_it_has_more_labels():
     y["thing"] = np.where(np.arange(60) < 30, "cup", "box")
     choices = dict.fromkeys(y, Choice("none", 3, 1))
     stopping = calibrated(choices, X, y).stopping_
-    named = [task for task, of_task in stopping.items() if of_task.remoteness]
-    assert named == ["thing"]
+    tasks = [task for task, of_task in stopping.items() if of_task.remoteness]
+    assert tasks == ["thing"]

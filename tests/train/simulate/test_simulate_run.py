@@ -91,11 +91,11 @@ def test_another_seed_gives_other_trials_and_fewer_trials_are_the_first(
 ):
     write(scenes.load(DEMO, seed=99, count=1), tmp_path / "seed")
     write(scenes.load(DEMO, count=1), tmp_path / "fewer")
-    both = digests(written[0])
+    first_seed = digests(written[0])
     second_seed = digests(tmp_path / "seed")
     fewer = digests(tmp_path / "fewer")
-    assert all(both[name] != digest for name, digest in second_seed.items())
-    assert all(both[name] == digest for name, digest in fewer.items())
+    assert all(first_seed[name] != digest for name, digest in second_seed.items())
+    assert all(first_seed[name] == digest for name, digest in fewer.items())
 
 
 def recorded(**effects):

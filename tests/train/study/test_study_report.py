@@ -102,9 +102,9 @@ def studied(tmp_path_factory):
 
 def test_every_number_of_the_report_is_in_a_csv(studied):
     text = (studied / "report.html").read_text()
-    named = set(re.findall(r'(?:src|srcset|href)="(?!data:image/png)([^"]*)"', text))
+    links = set(re.findall(r'(?:src|srcset|href)="(?!data:image/png)([^"]*)"', text))
     tables = {path.name for path in studied.glob("*.csv")}
-    assert named == tables
+    assert links == tables
     assert tables > {"methods.csv", "window.csv", "scaling.csv", "resolution.csv"}
     assert "features.csv" in tables
     assert 2 * len(list(studied.glob("*.png"))) == text.count("data:image/png")

@@ -116,11 +116,11 @@ def decisions(commands, fresh):
     answers = {task: [] for task in model.info.tasks}
     for path in sorted(fresh.iterdir()):
         recording = load(path)
-        seen = set()
+        tasks = set()
         for event in decide(model, recording, str(path), error):
             task = event.get("task")
-            if event["event"] == "decision" and task not in seen:
-                seen.add(task)
+            if event["event"] == "decision" and task not in tasks:
+                tasks.add(task)
                 right = event["label"] == recording.labels[task]
                 answers[task].append((right, event["window_s"]))
     return {task: np.array(pairs).T for task, pairs in answers.items()}

@@ -50,17 +50,17 @@ def test_the_front_has_the_windows_that_no_other_beats_in_both():
 def test_windows_are_measured_where_the_curve_is_steep(monkeypatch):
     """Ninety trials more at 1 s than at 0.8 s, and no more than one before and after."""
     right = {0.2: 4, 0.4: 4, 0.6: 5, 0.8: 5, 0.9: 50, 1.0: 95, 1.1: 95, 1.2: 96}
-    made = []
+    windows_s = []
 
     def choice(dataset, window_s, quick):
-        made.append(window_s)
+        windows_s.append(window_s)
         return {"t": chosen(right[window_s])}
 
     monkeypatch.setattr(choices, "chosen", choice)
     workers = Workers()
     points = choices.choices_at(None, list(right), "t", workers, quick=True)
     assert list(points) == [0.2, 0.6, 0.8, 0.9, 1.0, 1.2]
-    assert made == [0.2, 0.6, 1.2, 0.9, 0.8, 1.0]
+    assert windows_s == [0.2, 0.6, 1.2, 0.9, 0.8, 1.0]
 
 
 @pytest.fixture(scope="module")
@@ -141,10 +141,10 @@ class TestCosts:
         trials = [SimpleNamespace(path=Path(name)) for name in "abcd"]
         dataset = SimpleNamespace(trials=trials, layout=None)
         full = {"t": chosen(3, of=4)}
-        made = []
+        names = []
 
         def answered(change, like):
-            made.append(change.name)
+            names.append(change.name)
             return costs.hits(dataset, {"t": chosen(2, of=4)}), 1.0
 
         monkeypatch.setattr(costs, "changes", lambda *_: [])
@@ -154,7 +154,7 @@ class TestCosts:
         (row,) = costs.measure(None, dataset, {1.2: full}, 100.0, workers, quick=False)
         assert row["change"] == "all candidates"
         assert row["t, points"].startswith("+25 (")
-        assert made == ["the quick choice"]
+        assert names == ["the quick choice"]
 
     @pytest.mark.parametrize(
         ("side", "place"), [(16, "1 bus of AD7147"), (40, "a microcontroller")]
