@@ -126,12 +126,12 @@ def save_arrays(
 
 def find(paths: Iterable[str]) -> list[Path]:
     """The `.npz` files named, and those in the folders named (sorted, folders within
-    too), after interrupted changes are finished.
+    too), each once, after interrupted changes are finished.
 
     Raises:
         InputError: a folder holds no recording, or a change cannot be finished.
     """
-    files: list[Path] = []
+    files: dict[Path, None] = {}
     for path in map(Path, paths):
         # Path.is_dir raises for a name that is too long.
         is_folder = os.path.isdir(path)
@@ -140,8 +140,8 @@ def find(paths: Iterable[str]) -> list[Path]:
         inside = recordings_in(path) if is_folder else [path]
         if not inside:
             raise InputError(f"{path}: no .npz recording in this folder")
-        files += inside
-    return files
+        files |= dict.fromkeys(inside)
+    return list(files)
 
 
 def recordings_in(folder: Path) -> list[Path]:

@@ -50,6 +50,20 @@ class NameTaken(InputError):
     """A file of that name exists already."""
 
 
+def _make_folder(folder: str | os.PathLike[str]) -> None:
+    """Make a folder and those above it, if they are missing.
+
+    Raises:
+        InputError: its name is that of a file or a device.
+    """
+    try:
+        os.makedirs(folder, exist_ok=True)
+    except FileExistsError:
+        raise InputError(
+            f"{os.fspath(folder)}: cannot be written: it is no folder"
+        ) from None
+
+
 def check_writable(folder: str | os.PathLike[str]) -> None:
     """Make a folder if it is missing, and check that a file can be created in it.
 
@@ -59,7 +73,7 @@ def check_writable(folder: str | os.PathLike[str]) -> None:
         InputError: the folder cannot be made or written to.
     """
     with refusing(f"{os.fspath(folder)}: cannot be written"):
-        os.makedirs(folder, exist_ok=True)
+        _make_folder(folder)
         tempfile.TemporaryFile(dir=folder).close()
         remove_leftovers(folder)
 
@@ -133,7 +147,7 @@ def write_whole(
     # allows.
     temporary = folder / f"{PREFIX}{os.urandom(8).hex()}"
     try:
-        folder.mkdir(parents=True, exist_ok=True)
+        _make_folder(folder)
         with open(temporary, "xb") as file:
             with suppress(OSError):  # not every file system has locks
                 lock(file)
@@ -147,11 +161,7 @@ def write_whole(
             _name_free(temporary, target)
         if lasting:
             _sync_folder(folder)
-    except FileExistsError as error:
-        if error.filename == os.fspath(folder):
-            raise InputError(
-                f"{target}: cannot be written: {folder} is a file"
-            ) from None
+    except FileExistsError:
         raise NameTaken(
             f"{target}: exists already; choose another name or remove it"
         ) from None

@@ -10,7 +10,6 @@ import argparse
 
 import numpy as np
 
-from edge.arrays import Booleans
 from edge.commands.options import add_skin
 from edge.commands.output import LOG, Output, counted
 from edge.commands.source import chip_event, open_skin
@@ -26,13 +25,6 @@ SILENT = "taxels without a valid value"
 def add_options(parser: argparse.ArgumentParser) -> None:
     """Add the command's options."""
     add_skin(parser)
-
-
-def skin_map(served: list[int], invalid: Booleans) -> str:
-    """One line per row: `#` if a taxel is valid, `.` if not, blank without a chip."""
-    marks = np.full(invalid.shape, " ")
-    marks.flat[served] = np.where(invalid.flat[served], ".", "#")
-    return "\n".join(f"{i:3} |{''.join(row)}|" for i, row in enumerate(marks.tolist()))
 
 
 def below_rest(skin: Skin) -> int:
@@ -60,7 +52,11 @@ def run(arguments: argparse.Namespace) -> int:
         if status.state != "running" or bad == len(status.spec.served):
             silent += 1
         _say(output, status, bad)
-    output.text(skin_map(skin.file.served, invalid))
+    served = skin.file.served
+    marks = np.full(invalid.shape, " ")
+    marks.flat[served] = np.where(invalid.flat[served], ".", "#")
+    for i, row in enumerate(marks.tolist()):
+        output.text(f"{i:3} |{''.join(row)}|")
     answer = f"{len(statuses) - silent} of {len(statuses)} chips answer"
     if invalid.any():
         answer += f"; {SILENT}: {invalid.sum()}"
@@ -70,7 +66,7 @@ def run(arguments: argparse.Namespace) -> int:
             f"{counted(below, 'taxel')} below the rest value of the calibration: if "
             "something touched the skin then, calibrate again with nothing on it"
         )
-    return 1 if silent or invalid.any() else 0
+    return int(silent > 0 or invalid.any())
 
 
 def _say(output: Output, status: ChipStatus, bad: int) -> None:

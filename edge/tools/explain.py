@@ -284,8 +284,11 @@ def explanations(
 
 def _trial(near: Near, info: ModelInfo, labels: Sequence[str]) -> dict[str, Any]:
     """A training trial near a touch, with its name and its label."""
-    names = {"label": labels[near.label], "trial": info.trial(near.row)}
-    return {**near._asdict(), **names}
+    return {
+        **near._asdict(),
+        "label": labels[near.label],
+        "trial": info.trial(near.row),
+    }
 
 
 def text(line: dict[str, Any]) -> str:

@@ -73,6 +73,9 @@ def run(arguments: argparse.Namespace) -> int:
     output = Output.of(arguments)
     if arguments.undo:
         return undo(arguments.data, output)
+    tasks = {*arguments.unset, *dict(arguments.set)}
+    if len(tasks) < len(arguments.unset + arguments.set):
+        raise InputError("--set and --unset name a task twice; name it once")
     paths = find(arguments.data)
     changes = any((arguments.accept, arguments.set, arguments.unset, arguments.delete))
     # Nobody else changes what is changed here, from its reading on.
@@ -212,7 +215,8 @@ def changed(
     after = {**before, **labels}
     if accepts:
         after |= review.accepted({**meta, "labels": after})
-    after = {task: after[task] for task in after if task not in without}
+    for task in without:
+        after.pop(task, None)
     if meta.get("contacts") and after != before:
         raise InputError(
             f"{name}: its contacts have labels of their own; change meta.contacts"

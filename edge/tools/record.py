@@ -285,11 +285,13 @@ def _labels(arguments: argparse.Namespace) -> dict[str, str]:
     labels: dict[str, str] = {}
     for task, label in arguments.label:
         labels.setdefault(task, label)
-    if arguments.web is None and not labels:
+    if arguments.web is not None:
+        return labels
+    if not labels:
         raise InputError(
             "give --label TASK=LABEL; a trial without a label teaches nothing"
         )
-    if arguments.web is None and len(labels) < len(arguments.label):
+    if len(labels) < len(arguments.label):
         raise InputError(
             "--label names a task twice; only on the page, with --web, does a person "
             "choose the label"

@@ -149,11 +149,6 @@ def caption(frame: Frame, regions: Sequence[Region], layout: SkinLayout) -> str:
     return "  |  ".join(items)
 
 
-def screen(text: str) -> str:
-    """A text from the upper left corner on; each line clears the rest of its row."""
-    return HOME + "".join(f"{line}\x1b[K\n" for line in text.split("\n"))
-
-
 @contextmanager
 def drawing() -> Iterator[None]:
     """Within the block, the terminal is clear for pictures and its cursor is hidden."""
@@ -211,11 +206,9 @@ def run(arguments: argparse.Namespace) -> int:
             _follow(events, texts)
             if frame.t >= due:
                 due = frame.t + interval_s
-                print(
-                    screen(draw(frame, layout, texts)),
-                    end="",
-                    flush=True,
-                )
+                text = draw(frame, layout, texts) + "\n"
+                # Each line clears the rest of its row.
+                print(HOME + text.replace("\n", "\x1b[K\n"), end="", flush=True)
     return 0
 
 

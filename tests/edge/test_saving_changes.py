@@ -110,7 +110,8 @@ def test_a_deletion_is_finished_though_the_folder_of_deleted_ones_is_gone(new_da
     (day / JOURNAL).write_text('{"labels": {"a.npz": [{}, null]}}')
     assert find([str(day)]) == [day / "b.npz"]
     undo([day])
-    assert find([str(day)]) == [day / "a.npz", day / "b.npz"]
+    # A file that is named beside its folder counts once.
+    assert find([str(day), str(day / "b.npz")]) == [day / "a.npz", day / "b.npz"]
 
 
 def test_only_folders_with_a_deletion_get_a_folder_of_deleted_ones(new_days):

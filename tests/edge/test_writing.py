@@ -133,6 +133,7 @@ def test_a_folder_that_cannot_be_written_is_known_beforehand(tmp_path):
     (tmp_path / "file").write_text("")
     check_writable(tmp_path / "new" / "folder")
     reasons = {
+        tmp_path / "file": "it is no folder",
         tmp_path / "file" / "folder": "Not a directory",
         "a\0b": "embedded null byte",
     }

@@ -137,9 +137,9 @@ def write(
             without_threshold.append((path, recording))
     if skipped and not paths:
         raise InputError(skipped[0])
-    print(f"recordings written to {arguments.out}: {len(paths)}")
     if without_threshold:
         print(set_thresholds(without_threshold))
+    print(f"recordings written to {arguments.out}: {len(paths)}")
     return _status(arguments.out, paths, skipped)
 
 

@@ -281,8 +281,8 @@ def _say_missing(trials: Sequence[Samples], stand_in: float | None) -> list[floa
             continue
         if code < 0.0 <= others.min() or code - others.max() > np.ptp(others):
             say(
-                f"{counted(count, 'value')} of {code:g} stand alone; if they are missing, "
-                f"give --missing {code:g}"
+                f"{code:g} is far from all other values ({counted(count, 'value')}); if "
+                f"it means a missing one, give --missing {code:g}"
             )
             codes.append(code)
             values = others

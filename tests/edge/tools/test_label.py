@@ -75,6 +75,14 @@ def test_what_cannot_be_changed_leaves_every_file_as_it_was(a, refused):
     assert a.read_bytes() == before
 
 
+@pytest.mark.parametrize("second", [("--set", "object=lid"), ("--unset", "object")])
+def test_a_task_with_two_changes_is_refused(a, refused, second):
+    before = a.read_bytes()
+    message = refused("label", a, "--set", "object=box", *second, "--yes")
+    assert "name a task twice" in message
+    assert a.read_bytes() == before
+
+
 def test_nothing_changes_before_it_is_shown_and_agreed_to(a, refused):
     before = a.read_bytes()
     err = refused("label", a, "--set", "object=brick")

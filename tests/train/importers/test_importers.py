@@ -152,6 +152,14 @@ def test_the_command_writes_a_recording_for_each_grasp(capsys, three_grasps):
     assert f"recordings written to {three_grasps}: 3" in capsys.readouterr().out
 
 
+def test_what_cannot_be_written_is_not_called_written(capsys, tmp_path):
+    table = tmp_path / "cup.csv"
+    table.write_text("s1,s2\n0,1\n9,2\n")
+    words = ["import", "csv", str(table), "--rate", "9", "--out", str(table)]
+    assert main(words) == 2
+    assert "written to" not in capsys.readouterr().out
+
+
 def test_imported_grasps_train_with_the_hands_joints(three_grasps):
     features = Measurement(["contact_motion", "joint_change@2"])
     data = load_trials([three_grasps], features)
