@@ -25,7 +25,7 @@ def test_a_folder_that_cannot_be_written_is_named_before_any_work(tmp_path, caps
     (tmp_path / "file").touch()
     out = tmp_path / "file"
     assert main(["--data", str(tmp_path / "missing"), "--out", str(out)]) == 2
-    sentence = f"edge-classify export: {out}: cannot be written: File exists\n"
+    sentence = f"edge-classify export: {out}: cannot be written: it is no folder\n"
     assert capsys.readouterr().err == sentence
     words = ["--data", "missing", "--out", str(tmp_path), "--c", str(out)]
     assert main(words) == 2
