@@ -5,6 +5,7 @@ import platform
 import statistics
 import tempfile
 import timeit
+from collections.abc import Callable
 from dataclasses import replace
 from importlib.metadata import version
 from pathlib import Path
@@ -34,7 +35,12 @@ MOST_NAMES = 50_000
 of the data then says which trials they were."""
 
 
-def save(path: str | os.PathLike[str], fitted: Fitted, name: str | None = None) -> int:
+def save(
+    path: str | os.PathLike[str],
+    fitted: Fitted,
+    name: str | None = None,
+    write_more: Callable[[Model], object] = lambda model: None,
+) -> int:
     """Write a model, and `golden.npz` with its outputs beside it; the model's size in
     bytes.
 
@@ -42,16 +48,20 @@ def save(path: str | os.PathLike[str], fitted: Fitted, name: str | None = None) 
         path: of the model, such as `build/model.onnx`.
         fitted: the result of `train.fit`.
         name: of the model; that of the recordings' folder where None.
+        write_more: writes what else is made of the model, before it takes its place.
 
     Raises:
-        InputError: the files cannot be written.
+        InputError: the files cannot be written. A model that cannot be read, or that
+            `write_more` refuses, leaves the former one in its place.
     """
     data = to_onnx(fitted.sequential or fitted.classifier, describe(fitted, name))
     target = Path(path)
     with write_whole(target) as file:
         file.write(data)
         file.flush()
-        Model(file.name)  # one that cannot be read leaves the former one in its place
+        model = Model(file.name)
+        model.path = str(target)
+        write_more(model)
     golden.write(
         target.with_name("golden.npz"),
         Model(target),

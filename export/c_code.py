@@ -7,6 +7,7 @@ import os
 import re
 import string
 from collections.abc import Iterable, Mapping, Sized
+from contextlib import ExitStack
 from math import ceil, inf, prod
 from pathlib import Path
 
@@ -150,16 +151,18 @@ class Source:
         self._limits(doubts)
 
     def write(self, folder: str | os.PathLike[str]) -> None:
-        """Write all files, each whole or not at all."""
+        """Write all files, whole or not at all."""
         values = {}
         for name, value in self.values.items():
             values[name] = literal(value)
             if isinstance(value, Sized):
                 values[f"{name}_count"] = str(len(value))
-        for room in ROOMS.iterdir():
-            text = string.Template(room.read_text()).substitute(values)
-            with write_whole(Path(folder) / room.name) as file:
+        with ExitStack() as files:
+            for room in ROOMS.iterdir():
+                text = string.Template(room.read_text()).substitute(values)
+                file = files.enter_context(write_whole(Path(folder) / room.name))
                 file.write(text.encode())
+                file.flush()
 
     def _features(self) -> int:
         """The `ec_feature` of each feature; how many doubles they are measured in."""

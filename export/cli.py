@@ -6,6 +6,7 @@ import argparse
 import os
 import sys
 from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -219,7 +220,7 @@ def run(arguments: argparse.Namespace) -> int:
     with single_thread():
         fitted = _fit(arguments)
         path = arguments.out / "model.onnx"
-        size = save(path, fitted, arguments.name)
+        size = save(path, fitted, arguments.name, partial(_write_c, arguments))
         prices = measure(fitted)
         labels = [trial.labels for trial in fitted.dataset.trials]
         print("\n".join(counts_text(labels)), end="\n\n", file=sys.stderr)
@@ -229,13 +230,17 @@ def run(arguments: argparse.Namespace) -> int:
             from train.report.model_report import write  # loads matplotlib
 
             print(write(arguments.out, fitted, Model(path), prices, arguments.jobs))
-        if arguments.c:
-            from export.c_code import export
-
-            print(export(Model(path), arguments.c, arguments.c_error, arguments.flash))
         if held_out:
             print(held_out_text(Model(path), former, held_out), file=sys.stderr)
     return 0
+
+
+def _write_c(arguments: argparse.Namespace, model: Model) -> None:
+    """Write the model in C, where that is asked for."""
+    if arguments.c:
+        from export.c_code import export
+
+        print(export(model, arguments.c, arguments.c_error, arguments.flash))
 
 
 def _check_options(arguments: argparse.Namespace) -> None:

@@ -13,7 +13,7 @@ from edge.model.model import Model
 from edge.model.verify import verify
 from edge.recording import load
 from edge.saving import save
-from export import api
+from export import api, c_code
 from train.report.summary import names, warnings
 
 
@@ -28,11 +28,14 @@ def test_a_fitted_model_is_saved_with_its_golden_outputs(fitted, tmp_path):
     assert task.accuracy == fitted.chosen["object"].accuracy.accuracy
 
 
-def test_a_model_that_cannot_be_read_leaves_the_former_one(
+def test_a_model_that_cannot_be_read_or_be_written_in_c_leaves_the_former_one(
     fitted, tmp_path, monkeypatch
 ):
     path = tmp_path / "model.onnx"
     path.write_bytes(b"former")
+    with pytest.raises(InputError, match=r"model.onnx: takes 24 kB of flash in C"):
+        export.save(path, fitted, None, lambda m: c_code.export(m, tmp_path, None, 1))
+    assert path.read_bytes() == b"former"
     monkeypatch.setattr(api, "to_onnx", lambda *words: b"no model")
     with pytest.raises(InputError, match="not an ONNX model"):
         export.save(path, fitted)

@@ -369,7 +369,11 @@ def test_what_does_not_fit_the_flash_is_left_out_and_said(early, tmp_path, monke
     assert_same_events(model, tmp_path, machine.compiled(tmp_path), touches)
 
 
-def test_a_file_in_the_folder_s_place_is_one_sentence(tmp_path):
+def test_what_cannot_be_written_is_one_sentence_and_leaves_no_file(tmp_path):
     (tmp_path / "file").touch()
     with pytest.raises(InputError, match="file: cannot be written: it is no folder"):
         c_code.export(Model(demo.MODEL), tmp_path / "file")
+    (tmp_path / "c" / "main.c").mkdir(parents=True)
+    with pytest.raises(InputError, match="main.c: cannot be written"):
+        c_code.export(Model(demo.MODEL), tmp_path / "c")
+    assert [path.name for path in (tmp_path / "c").iterdir()] == ["main.c"]
