@@ -8,14 +8,13 @@ import subprocess
 import sys
 import time
 import timeit
-from pathlib import Path
 
 from edge.fake.player import calibrated
 from edge.skin import file as skinfile
 from edge.skin.skin import Skin
+from tests.bench import tables
 from tests.edge.bus.shim import build as shim
 
-ROOT = Path(__file__).parents[2]
 WIRE_S = (12 * 255 + 3 * 20) / 400_000
 """The shortest time of a frame over three buses: 12 chips and 3 channels on the
 longest."""
@@ -46,5 +45,5 @@ def bench_overhead_of_software(note, tmp_path):
         "-c",
         "from tests.bench import bench_bus; print(bench_bus.measure())",
     ]
-    ours_s = float(subprocess.check_output(command, env=environment, cwd=ROOT))
+    ours_s = float(subprocess.check_output(command, env=environment, cwd=tables.ROOT))
     note("the wire at 400 kHz", ours_s / WIRE_S, "at most 0.02", ours_s, WIRE_S)

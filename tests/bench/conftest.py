@@ -21,8 +21,7 @@ ROWS = pytest.StashKey()
 def pytest_collection_modifyitems(items):
     """A benchmark may take its time."""
     for item in items:
-        if item.path.name.startswith("bench_"):
-            item.add_marker(pytest.mark.slow)
+        item.add_marker(pytest.mark.slow)
 
 
 def pytest_sessionfinish(session):
@@ -58,18 +57,19 @@ def against(note):
     """Times ours beside its rivals; returns seconds of ours.
 
     Each of the rounds has so many calls. `rivals` is {name: (its function, largest
-    allowed ours / rival or None)}; `timer` counts processor time of all threads, unless
-    other processes are timed.
+    allowed ours / rival or None)}.
     """
 
-    def run(ours, rivals, *, calls=20, rounds=25, timer=time.process_time):
+    def run(ours, rivals, *, calls=20, rounds=25):
         functions = [*(rival for rival, _ in rivals.values()), ours]
         for function in functions:
             function()
         seconds = np.empty((rounds, len(functions)))
         for place in np.ndindex(seconds.shape):
             function = functions[place[1]]
-            seconds[place] = timeit.timeit(function, number=calls, timer=timer) / calls
+            # Processor time of all threads.
+            whole = timeit.timeit(function, number=calls, timer=time.process_time)
+            seconds[place] = whole / calls
         medians = np.median(seconds, axis=0)
         ratios = np.median(seconds[:, -1:] / seconds, axis=0)
         for i, (name, (_, most)) in enumerate(rivals.items()):

@@ -9,11 +9,9 @@ import subprocess
 import sys
 import venv
 import zipfile
-from email.parser import Parser
 
 import pytest
 
-import edge
 from tests.board.debian import CHECKOUT
 from tests.conftest import ended
 
@@ -64,24 +62,6 @@ def test_it_holds_edge_alone_and_all_of_it(contents):
     command = ["git", "ls-files", "edge"]
     tracked = subprocess.check_output(command, cwd=CHECKOUT, text=True)
     assert inside == set(tracked.split())
-
-
-@pytest.fixture
-def fields(contents):
-    (metadata,) = (v for k, v in contents.items() if k.endswith(".dist-info/METADATA"))
-    return Parser().parsestr(metadata.decode())
-
-
-def test_it_names_three_dependencies(fields):
-    names = [n for n in fields.get_all("Requires-Dist") if "extra ==" not in n]
-    dependencies = sorted(name.split(">")[0] for name in names)
-    assert dependencies == ["numpy", "onnxruntime", "smbus2"]
-
-
-def test_it_names_one_version_and_a_licence(fields, contents):
-    assert fields["Version"] == edge.__version__
-    assert fields["License-Expression"] == "BSD-3-Clause"
-    assert any(name.endswith("/LICENSE") for name in contents)
 
 
 def test_the_demo_decides_rightly_and_meets_its_golden_outputs(command):

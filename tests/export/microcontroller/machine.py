@@ -36,31 +36,25 @@ FLAGS = (
 """In the order of their bits in C."""
 
 
+def tools(board):
+    """The words that compile for a processor, and those that run a program on it."""
+    cpu, options, machine, code, ram = BOARDS[board]
+    gcc = ["arm-none-eabi-gcc", f"-mcpu={cpu}", "-mthumb", *options.split()]
+    gcc += ["--specs=rdimon.specs", f"-Wl,--defsym=CODE={code},--defsym=RAM={ram}"]
+    gcc += ["-T", str(HERE / "board.ld"), str(HERE / "startup.c")]
+    qemu = f"qemu-system-arm -M {machine} -nographic -semihosting -kernel"
+    return gcc, qemu.split()
+
+
 def compiled(folder, board=None):
     """The command that answers `input.bin` in a folder of C."""
     sources = [*map(str, folder.glob("*.c")), str(HERE / "host.c")]
     sources = [source for source in sources if Path(source).name != "main.c"]
-    program = folder / f"answer-{board or 'host'}"
-    if board is None:
-        gcc = ["gcc", *COMMON, *SANITIZED]
-        command = [str(program)]
-    else:
-        cpu, options, machine, code, ram = BOARDS[board]
-        gcc = [
-            "arm-none-eabi-gcc",
-            *COMMON,
-            f"-mcpu={cpu}",
-            "-mthumb",
-            *options.split(),
-        ]
-        gcc += ["--specs=rdimon.specs", f"-Wl,--defsym=CODE={code},--defsym=RAM={ram}"]
-        gcc += ["-T", str(HERE / "board.ld"), str(HERE / "startup.c")]
-        command = (
-            f"qemu-system-arm -M {machine} -nographic -semihosting -kernel".split()
-        )
-        command.append(str(program))
-    subprocess.run([*gcc, "-I", str(folder), *sources, "-o", str(program)], check=True)
-    return command
+    program = str(folder / f"answer-{board or 'host'}")
+    gcc, command = tools(board) if board else (["gcc", *SANITIZED], [])
+    words = [*gcc, *COMMON, "-I", str(folder), *sources, "-o", program]
+    subprocess.run(words, check=True)
+    return [*command, program]
 
 
 def ask(command, folder, questions):
