@@ -7,10 +7,9 @@
 #define RADIANS 0.017453292519943295 /* of a degree */
 
 ec_contact ec_now; /* the contact that is followed */
+ec_row ec_rows[EC_FRAMES];
 static ec_set active;
 static ec_region region;
-
-static bool finite(double x) { return x - x == 0.0; }
 
 bool ec_released(double touched_s, double now_s) {
   return now_s - touched_s >= EC_RELEASE_S - CLOCK_ROUNDING_S;
@@ -65,10 +64,14 @@ static void carried(const double *joints, double p[3]) {
   }
 }
 
-/* Distance from where this centroid was first seen; not a number without a pose. */
-static double distance(ec_start *start, double row, double col, const double *joints) {
+/* Distance of the centroid of a zone's sums from where it was first seen; not a number without a
+   pose. */
+static double distance(ec_start *start, const int64_t *sums, const double *joints) {
   double p[3];
-  skin_point(row, col, p);
+  double total = (double)sums[2];
+  double col = (double)sums[4] / total;
+  if (col >= EC_COLS) col -= EC_COLS;
+  skin_point((double)sums[3] / total, col, p);
   if (EC_LINKS && !joints) {
     ec_now.missing_pose = true;
     return EC_NAN;
@@ -84,38 +87,31 @@ static double distance(ec_start *start, double row, double col, const double *jo
   return ec_sqrt(x * x + y * y + z * z);
 }
 
-static bool any_finite(uint32_t which) {
-  for (uint32_t i = 0; i < ec_now.rows; i++) {
-    if (finite(ec_now.row[i].motions[which])) return true;
-  }
-  return false;
-}
-
 /* Of two readings of one instant the later one counts. */
 static void forget_last(void) {
   ec_now.rows--;
   for (uint32_t i = 0; i < 2; i++) {
-    if (!any_finite(i)) ec_now.starts[i].known = false;
+    ec_now.starts[i].known = false;
+    for (uint32_t j = 0; j < ec_now.rows; j++) {
+      double motion = ec_rows[j].motions[i];
+      if (motion == motion) ec_now.starts[i].known = true;
+    }
   }
 }
 
-static void move(ec_row *row, bool touched, const double *joints) {
+static void move(ec_row *row, const double *joints) {
+  bool touched = region.area > 0;
   for (uint32_t i = 0; i < 2; i++) {
-    row->motions[i] = !touched && ec_now.rows ? ec_now.row[ec_now.rows - 1].motions[i] : 0.0;
+    row->motions[i] = !touched && ec_now.rows ? ec_rows[ec_now.rows - 1].motions[i] : 0.0;
   }
   if (touched && EC_MOTION) {
-    int64_t rows;
-    int64_t cols;
-    ec_sums(&region, &rows, &cols);
-    double area = region.area;
-    row->motions[0] =
-        distance(&ec_now.starts[0], (double)rows / area, (double)cols / area, joints);
+    int64_t taxels[EC_ZONE_WIDTH];
+    ec_zone(EC_CONTACT, active, &region, 0, taxels);
+    taxels[4] %= EC_COLS * taxels[2];
+    row->motions[0] = distance(&ec_now.starts[0], taxels, joints);
   }
   if (touched && EC_FORCE_MOTION) {
-    double force = (double)row->zones[0][2];
-    double col = (double)row->zones[0][4] / force;
-    if (col >= EC_COLS) col -= EC_COLS;
-    row->motions[1] = distance(&ec_now.starts[1], (double)row->zones[0][3] / force, col, joints);
+    row->motions[1] = distance(&ec_now.starts[1], row->zones[0], joints);
   }
 }
 
@@ -129,8 +125,7 @@ static void pool(
   }
 }
 
-static int add(
-    const uint16_t *counts, const bool *valid, const double *joints, double age_s, bool touched) {
+static int add(const uint16_t *counts, const bool *valid, const double *joints, double age_s) {
   if (ec_now.rows && age_s <= ec_now.age_s) {
     age_s = ec_now.age_s;
     forget_last();
@@ -139,16 +134,15 @@ static int add(
   for (uint32_t i = 0; valid && i < TAXELS; i++) {
     if (!valid[i] && ec_alive[i]) ec_now.missing_taxels = true;
   }
-  ec_row *row = &ec_now.row[ec_now.rows];
+  ec_row *row = &ec_rows[ec_now.rows];
   row->t = age_s;
-  row->peak = touched ? region.peak : 0;
-  row->area = touched ? region.area : 0;
-  if (touched) ec_now.region = region;
+  row->peak = region.peak;
+  row->area = region.area;
+  if (region.area) ec_now.region = region;
   for (uint32_t i = 0; ec_zone_names[i] != EC_NO_ZONE; i++) {
-    for (uint32_t j = 0; j < EC_ZONE_WIDTH; j++) row->zones[i][j] = 0;
-    if (touched) ec_zone((ec_zone_name)ec_zone_names[i], active, &region, counts, row->zones[i]);
+    ec_zone((ec_zone_name)ec_zone_names[i], active, &region, counts, row->zones[i]);
   }
-  move(row, touched, joints);
+  move(row, joints);
   if (EC_CELLS) pool(counts, valid, ec_cell_of_taxel, row->cells, EC_CELLS);
   if (EC_KERNEL_CELLS) {
     pool(counts, valid, ec_kernel_cell_of_taxel, row->kernel_cells, EC_KERNEL_CELLS);
@@ -160,31 +154,17 @@ static int add(
   return 0;
 }
 
-static void begin(double t) {
-  ec_now.under_way = true;
-  ec_now.ended = false;
-  ec_now.onset_s = t;
-  ec_now.age_s = 0.0;
-  ec_now.touched_s = 0.0;
-  ec_now.frames = 0;
-  ec_now.rows = 0;
-  ec_now.missing_taxels = false;
-  ec_now.missing_pose = false;
-  for (uint32_t i = 0; i < 2; i++) ec_now.starts[i].known = false;
-}
-
 /* Take a frame into the contact, and end it where it is over. */
 int ec_follow(const uint16_t *counts, const bool *valid, double t, const double *joints) {
-  static const ec_set nothing;
   int error = 0;
-  if (ec_now.ended) ec_now.under_way = ec_now.ended = false;
-  ec_active(counts, valid, active);
-  const bool *former = ec_now.under_way ? ec_now.region.taxels : nothing;
-  bool touched = ec_largest(active, counts, former, &region);
-  bool above = touched && region.peak > EC_ONSET;
+  if (ec_now.ended) ec_now = (ec_contact){0};
+  ec_largest(counts, valid, ec_now.region.taxels, active, &region);
+  bool touched = region.area > 0;
+  bool above = region.peak > EC_ONSET;
   if (!ec_now.under_way) {
     if (!above) return 0;
-    begin(t);
+    ec_now.under_way = true;
+    ec_now.onset_s = t;
   }
   double age_s = t - ec_now.onset_s;
   bool confirmed = ec_now.frames >= EC_DEBOUNCE;
@@ -196,7 +176,7 @@ int ec_follow(const uint16_t *counts, const bool *valid, double t, const double 
   /* A reading without contact replaces none of its instant. */
   bool is_new = touched || age_s > ec_now.age_s;
   if (is_new && (!confirmed || ec_now.age_s < EC_WINDOW_S)) {
-    error = add(counts, valid, joints, age_s, touched);
+    error = add(counts, valid, joints, age_s);
   }
   if (touched) {
     ec_now.touched_s = age_s;

@@ -2,25 +2,14 @@
    agreement.py. */
 #include "internal.h"
 
-typedef struct {
-  double confidence; /* rounded as Python rounds it */
-  uint32_t nearest;
-  int16_t label; /* -1: null */
-  int16_t decision_label;
-  uint16_t flags;
-  bool refused;
-  ec_stopped_by stopped_by;
-} answer;
-
-static answer answers[EC_TASKS];
+static ec_event answers[EC_TASKS]; /* that of a decided task stays */
+static int16_t agreed[EC_TASKS];   /* the labels in which the tasks agree; -1: refused */
+static double distances[EC_TASKS][EC_MOST_LABELS];
 static bool decided[EC_TASKS];
 static uint32_t waiting; /* tasks */
 static uint32_t point;   /* the next decision point */
 static bool announced;   /* whether the onset was */
 static double last_s;
-static double distances[EC_TASKS][EC_MOST_LABELS];
-
-static double output(uint32_t place) { return ec_arena[place]; }
 
 /* To millionths, as Python's round does it; x is from 0 to 1. */
 static double rounded(double x) {
@@ -33,33 +22,33 @@ static double rounded(double x) {
   return n / 1e6;
 }
 
-static double margin(const double *distance, int16_t label, uint32_t labels) {
+static double margin(uint32_t index) {
+  const double *distance = distances[index];
+  double own = distance[agreed[index]];
   double rival = EC_INFINITY;
-  for (uint32_t i = 0; i < labels; i++) {
-    if ((int16_t)i != label && distance[i] < rival) rival = distance[i];
+  for (int16_t i = 0; i < ec_tasks[index].labels; i++) {
+    if (i != agreed[index] && distance[i] < rival) rival = distance[i];
   }
-  if (labels == 1) rival = distance[label];
-  return distance[label] < EC_INFINITY ? rival - distance[label] : -EC_INFINITY;
+  if (ec_tasks[index].labels == 1) rival = own;
+  return own < EC_INFINITY ? rival - own : -EC_INFINITY;
 }
 
 static double excess(void) {
   double typical = ec_typical[point];
-  double score = output(EC_PLACE_NOVELTY);
+  double score = ec_arena[EC_PLACE_NOVELTY];
   return score > typical && typical > 0.0 ? ec_log(score / typical) : 0.0;
 }
 
 /* Probability that the thing is one of those in training. */
 static double known(void) {
-  double score = output(EC_PLACE_REMOTENESS);
+  double score = ec_arena[EC_PLACE_REMOTENESS];
   if (score <= 0.0) return 1.0;
   return ec_logistic(ec_slopes[point] * ec_log(ec_middles[point] / score));
 }
 
-/* The calibrated confidence of a label by its curve. */
-static double confidence(
-    const ec_curve *curve, const ec_task *task, const double *distance, int16_t label) {
-  double log_odds = curve->slope * margin(distance, label, task->labels);
-  log_odds += curve->intercept;
+/* The calibrated confidence of a task's label by a curve. */
+static double confidence(const ec_curve *curve, uint32_t index) {
+  double log_odds = curve->slope * margin(index) + curve->intercept;
   return ec_logistic(log_odds - curve->doubt * excess());
 }
 
@@ -74,10 +63,10 @@ static void agree(uint32_t index) {
     }
     if (total[i] < total[best]) best = i;
   }
-  answers[index].decision_label = (int16_t)best;
+  agreed[index] = (int16_t)best;
   for (uint32_t f = 0; f < 2; f++) {
     uint32_t factor = task->factors[f];
-    answers[factor].decision_label = task->indices[f][best];
+    agreed[factor] = task->indices[f][best];
     for (uint32_t i = 0; i < ec_tasks[factor].labels; i++) distances[factor][i] = EC_INFINITY;
     for (uint32_t i = 0; i < task->labels; i++) {
       double *nearest = &distances[factor][task->indices[f][i]];
@@ -86,7 +75,7 @@ static void agree(uint32_t index) {
   }
 }
 
-static void withhold(answer *a) {
+static void withhold(ec_event *a) {
   a->label = -1;
   a->confidence = 0.0;
   a->flags |= EC_UNKNOWN;
@@ -95,33 +84,36 @@ static void withhold(answer *a) {
 static uint16_t flag(bool holds, uint16_t bit) { return holds ? bit : 0; }
 
 /* The model's answer to a task, with the reasons to doubt it. */
-static void ask(uint32_t index, uint16_t doubts) {
+static void ask(uint32_t index, bool refused, uint16_t doubts) {
   const ec_task *task = &ec_tasks[index];
-  answer *a = &answers[index];
+  ec_event answer = {EC_DECIDED_EVENT, ec_now.onset_s, ec_windows_s[point], 0.0, 0, -1, doubts,
+                     (uint8_t)index, EC_NOTHING};
+  ec_event *a = &answers[index];
+  *a = answer;
+  a->flags |= flag(refused || ec_arena[EC_PLACE_OUT_OF_RANGE] > 0.0, EC_OUT_OF_RANGE);
+  if (refused) return;
   double most = 0.0;
   uint32_t ties = 0;
   for (uint32_t i = 0; i < task->labels; i++) {
-    double votes = output(task->places.scores + i);
+    double votes = ec_arena[task->places.scores + i];
     ties = votes > most ? 1 : ties + (votes == most);
     if (votes > most) most = votes;
   }
-  a->label = a->decision_label;
-  a->stopped_by = EC_NOTHING;
-  a->nearest = (uint32_t)output(task->places.neighbours);
-  a->flags = doubts;
-  a->flags |= flag(output(task->places.distances) == 0.0, EC_AS_TRAINED);
-  a->flags |= flag(output(EC_PLACE_OUT_OF_RANGE) > 0.0, EC_OUT_OF_RANGE);
+  a->label = agreed[index];
+  a->nearest = (uint32_t)ec_arena[task->places.neighbours];
+  a->flags |= flag(ec_arena[task->places.distances] == 0.0, EC_AS_TRAINED);
   a->flags |= flag(ties > 1, EC_TIE);
   a->confidence = EC_NAN;
   if (!EC_CALIBRATED) return;
-  double likely = confidence(&task->curves[point], task, distances[index], a->decision_label);
+  double likely = confidence(&task->curves[point], index);
   if (index == EC_NAMING) likely *= known();
   a->confidence = rounded(likely);
-  if (index == EC_NAMING && output(EC_PLACE_REMOTENESS) > ec_remote[point]) withhold(a);
+  a->flags |= flag(ec_arena[EC_PLACE_NOVELTY] > ec_novel[point], EC_UNUSUAL);
+  if (index == EC_NAMING && ec_arena[EC_PLACE_REMOTENESS] > ec_remote[point]) withhold(a);
 }
 
-/* The model's answers at the decision point. */
-static void ask_all(bool is_short) {
+/* The model's answers at the decision point to the tasks that wait; whether it refuses. */
+static bool ask_all(bool is_short) {
   uint16_t doubts = flag(is_short, EC_SHORT);
   doubts |= flag(ec_now.missing_taxels, EC_MISSING_TAXELS);
   doubts |= flag(ec_now.missing_pose, EC_MISSING_POSE);
@@ -129,30 +121,24 @@ static void ask_all(bool is_short) {
   ec_vector(ec_windows_s[point]);
   ec_graph(point);
   for (uint32_t i = 0; i < EC_TASKS; i++) {
-    answers[i].decision_label = (int16_t)output(ec_tasks[i].places.label);
-    refused = refused || answers[i].decision_label < 0;
-    for (uint32_t j = 0; ec_tasks[i].places.label_distances && j < ec_tasks[i].labels; j++) {
-      distances[i][j] = output(ec_tasks[i].places.label_distances + j);
+    const ec_task *task = &ec_tasks[i];
+    agreed[i] = (int16_t)ec_arena[task->places.label];
+    refused = refused || agreed[i] < 0;
+    for (uint32_t j = 0; task->places.label_distances && j < task->labels; j++) {
+      distances[i][j] = ec_arena[task->places.label_distances + j];
     }
   }
-  for (uint32_t i = 0; i < EC_TASKS; i++) {
-    if (refused) {
-      answer null = {0.0, 0, -1, -1, (uint16_t)(doubts | EC_OUT_OF_RANGE), true, EC_NOTHING};
-      answers[i] = null;
-    } else if (ec_tasks[i].is_product) {
-      agree(i);
-    }
+  for (uint32_t i = 0; i < EC_TASKS && !refused; i++) {
+    if (ec_tasks[i].is_product) agree(i);
   }
-  if (refused) return;
-  doubts |= flag(EC_CALIBRATED && output(EC_PLACE_NOVELTY) > ec_novel[point], EC_UNUSUAL);
   for (uint32_t i = 0; i < EC_TASKS; i++) {
-    answers[i].refused = false;
-    ask(i, doubts);
+    if (!decided[i]) ask(i, refused, doubts);
   }
+  return refused;
 }
 
 /* The answer of the task's rule. */
-static bool stop(answer *a, const ec_task *task, bool sure) {
+static bool stop(ec_event *a, const ec_task *task, bool sure) {
   if (a->label >= 0 && !sure && task->rule_confidence <= 1.0) a->flags |= EC_UNSURE;
   a->stopped_by = sure ? EC_CONFIDENCE : EC_WINDOW;
   a->flags &= (uint16_t)~EC_TIE; /* the rule does not go by votes */
@@ -160,8 +146,8 @@ static bool stop(answer *a, const ec_task *task, bool sure) {
 }
 
 /* A product is decided when both factors are, by their labels. */
-static bool stop_product(const ec_task *task, answer *a) {
-  const answer *f[2] = {&answers[task->factors[0]], &answers[task->factors[1]]};
+static bool stop_product(const ec_task *task, ec_event *a) {
+  const ec_event *f[2] = {&answers[task->factors[0]], &answers[task->factors[1]]};
   if (!decided[task->factors[0]] || !decided[task->factors[1]]) return false;
   bool sure = f[0]->stopped_by == EC_CONFIDENCE && f[1]->stopped_by == EC_CONFIDENCE;
   int16_t pair = -1;
@@ -181,8 +167,8 @@ static bool stop_product(const ec_task *task, answer *a) {
 /* Whether a task is decided at the decision point, by the rule certified for the error rate. */
 static bool is_decided(uint32_t index) {
   const ec_task *task = &ec_tasks[index];
-  answer *a = &answers[index];
-  if (!EC_EARLY || a->refused) return true;
+  ec_event *a = &answers[index];
+  if (!EC_EARLY) return true;
   if (!task->has_rule) {
     a->flags |= EC_UNCERTIFIED;
     if (point != EC_POINTS - 1) return false;
@@ -190,8 +176,7 @@ static bool is_decided(uint32_t index) {
   if (task->is_product) return stop_product(task, a);
   if (!task->has_rule) return true;
   bool waits = a->flags & EC_UNUSUAL;
-  double likely = confidence(&task->rule_curve, task, distances[index], a->decision_label);
-  bool sure = likely >= task->rule_confidence;
+  bool sure = confidence(&task->rule_curve, index) >= task->rule_confidence;
   uint32_t last = waits ? EC_POINTS - 1 : task->rule_last;
   if (point < last && (waits || !sure)) return false;
   return stop(a, task, sure);
@@ -199,21 +184,12 @@ static bool is_decided(uint32_t index) {
 
 /* Ask at the decision point; the number of events. Factors come before their products. */
 static int decide(ec_event *events, bool is_short) {
-  static answer former[EC_TASKS];
   int count = 0;
-  for (uint32_t i = 0; i < EC_TASKS; i++) former[i] = answers[i];
-  ask_all(is_short);
+  bool refused = ask_all(is_short);
   for (uint32_t order = 0; order < EC_TASKS; order++) {
     uint32_t i = ec_order[order];
-    if (decided[i]) {
-      answers[i] = former[i];
-      continue;
-    }
-    if (!is_decided(i)) continue;
-    const answer *a = &answers[i];
-    ec_event event = {EC_DECIDED_EVENT, ec_now.onset_s, ec_windows_s[point], a->confidence,
-                      a->nearest, a->label, a->flags, (uint8_t)i, a->stopped_by};
-    events[count++] = event;
+    if (decided[i] || !(refused || is_decided(i))) continue;
+    events[count++] = answers[i];
     decided[i] = true;
     waiting--;
   }
@@ -221,8 +197,7 @@ static int decide(ec_event *events, bool is_short) {
 }
 
 void ec_begin(void) {
-  ec_now.under_way = false;
-  ec_now.ended = false;
+  ec_now.ended = true;
   announced = false;
   waiting = 0;
   last_s = -EC_INFINITY;
@@ -230,15 +205,13 @@ void ec_begin(void) {
 
 bool ec_is_touched(void) { return ec_now.under_way && !ec_now.ended; }
 
-static bool usable(double x) { return x >= -1e6 && x <= 1e6; }
-
 int ec_push(
     const uint16_t *counts, const bool *valid, double t_s, const double *joints,
     ec_event events[EC_MOST_EVENTS]) {
   int count = 0;
   if (!(t_s >= last_s) || t_s - t_s != 0.0) return EC_BAD_TIME;
   for (uint32_t i = joints ? EC_DOF : 0; i-- > 0;) {
-    if (!usable(joints[i])) return EC_BAD_JOINTS;
+    if (!(joints[i] >= -1e6 && joints[i] <= 1e6)) return EC_BAD_JOINTS;
   }
   last_s = t_s;
   if (ec_now.ended) announced = false;

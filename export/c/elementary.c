@@ -23,8 +23,7 @@ double ec_exp2(int power) {
   return x.value;
 }
 
-/* A number above 0 as a fraction from 0.5 to 1 times a power of two. */
-static double frexp_of(double x, int *power) {
+double ec_frexp(double x, int *power) {
   number y;
   y.value = x;
   *power = -1022;
@@ -35,12 +34,6 @@ static double frexp_of(double x, int *power) {
   *power += (int)(y.bits >> 52);
   y.bits = (y.bits & 0xFFFFFFFFFFFFFu) | (uint64_t)1022 << 52;
   return y.value;
-}
-
-int ec_exponent(double x) {
-  int power = 0;
-  if (x > 0.0) frexp_of(x, &power);
-  return power;
 }
 
 double ec_rint(double x) {
@@ -69,7 +62,7 @@ double ec_sqrt(double x) {
   if (!(x > 0.0) || x > 1.7976931348623157e308) return x < 0.0 ? (x - x) / (x - x) : x;
   int power;
   number y;
-  y.value = frexp_of(x, &power);
+  y.value = ec_frexp(x, &power);
   uint64_t rest = (y.bits & 0xFFFFFFFFFFFFFu) | (uint64_t)1 << 52; /* 53 bits */
   power -= 1;
   if (power & 1) {
@@ -92,7 +85,7 @@ double ec_sqrt(double x) {
 
 double ec_log(double x) {
   int power;
-  double fraction = frexp_of(x, &power);
+  double fraction = ec_frexp(x, &power);
   if (fraction < SQRT_HALF) {
     fraction *= 2.0;
     power -= 1;

@@ -15,15 +15,15 @@ static uint32_t frames; /* of felt */
 static void feel(double window_s) {
   uint32_t n = 0;
   uint32_t last = 0;
-  while (n < ec_now.rows && ec_now.row[n].t < window_s) n++;
+  while (n < ec_now.rows && ec_rows[n].t < window_s) n++;
   if (n < ec_now.rows) n++;
   for (uint32_t i = 0; i < n; i++) {
-    if (ec_now.row[i].area) last = i;
+    if (ec_rows[i].area) last = i;
   }
-  bool is_over = ec_released(ec_now.row[last].t, ec_now.row[n - 1].t);
+  bool is_over = ec_released(ec_rows[last].t, ec_rows[n - 1].t);
   frames = 0;
   for (uint32_t i = 0; i < n; i++) {
-    if (ec_now.row[i].area || (is_over && i > last)) felt[frames++] = &ec_now.row[i];
+    if (ec_rows[i].area || (is_over && i > last)) felt[frames++] = &ec_rows[i];
   }
 }
 
@@ -194,7 +194,9 @@ static double summary(uint8_t kind, double *x, uint32_t n) {
     return summed(x, n - 1) / (n - 1);
   }
   if (kind == EC_S_MEAN) return summed(x, n) / n;
-  int power = ec_exponent(largest_of(x, n));
+  double largest = largest_of(x, n);
+  int power = 0;
+  if (largest > 0.0) ec_frexp(largest, &power);
   int half = power / 2;
   for (uint32_t i = 0; i < n; i++) x[i] = x[i] * ec_exp2(-half) * ec_exp2(half - power);
   double mean = summed(x, n) / n;

@@ -10,43 +10,28 @@ static uint32_t now; /* the decision point */
    it makes of those along it. */
 enum { BEFORE, ALONG, BEHIND, COUNT };
 
-typedef struct {
-  const double *values; /* NULL of a table */
-  const ec_table *table;
-} operand;
-
-static operand operand_at(uint32_t place) {
-  operand x = {0, 0};
-  if (place < EC_ARENA) {
-    x.values = ec_arena + place;
-  } else {
-    x.table = &ec_tables[place - EC_ARENA];
-  }
-  return x;
-}
-
-static double at(operand x, uint32_t i) {
-  if (x.values) return x.values[i];
-  i += now * x.table->stride;
-  switch (x.table->type) {
-    case EC_INT8: return ((const int8_t *)x.table->data)[i];
-    case EC_INT16: return ((const int16_t *)x.table->data)[i];
-    case EC_INT32: return ((const int32_t *)x.table->data)[i];
-    case EC_FLOAT32: return (double)((const float *)x.table->data)[i];
-    default: return ((const double *)x.table->data)[i];
+/* A number of the arena or of a table. */
+static double at(uint32_t place, uint32_t i) {
+  if (place < EC_ARENA) return ec_arena[place + i];
+  const ec_table *table = &ec_tables[place - EC_ARENA];
+  i += now * table->stride;
+  switch (table->type) {
+    case EC_INT8: return ((const int8_t *)table->data)[i];
+    case EC_INT16: return ((const int16_t *)table->data)[i];
+    case EC_INT32: return ((const int32_t *)table->data)[i];
+    case EC_FLOAT32: return (double)((const float *)table->data)[i];
+    default: return ((const double *)table->data)[i];
   }
 }
 
 /* The sizes are others here: of the output, and of the inputs, each as many or 1. */
 static void element_wise(const ec_step *step) {
-  operand a = operand_at(step->inputs[0]);
-  operand b = operand_at(step->inputs[1]);
-  operand c = operand_at(step->inputs[2]);
+  const uint32_t *inputs = step->inputs;
   double *out = ec_arena + step->outputs[0];
   for (uint32_t i = 0; i < step->sizes[0]; i++) {
-    double x = at(a, step->sizes[1] > 1 ? i : 0);
-    double y = at(b, step->sizes[2] > 1 ? i : 0);
-    double z = at(c, step->sizes[3] > 1 ? i : 0);
+    double x = at(inputs[0], step->sizes[1] > 1 ? i : 0);
+    double y = at(inputs[1], step->sizes[2] > 1 ? i : 0);
+    double z = at(inputs[2], step->sizes[3] > 1 ? i : 0);
     switch (step->operator) {
       case EC_ADD: out[i] = x + y; break;
       case EC_SUB: out[i] = x - y; break;
@@ -66,7 +51,7 @@ static void element_wise(const ec_step *step) {
 /* Whether all factors are whole numbers of 32 bits; then `factors` has them. */
 static int32_t factors[EC_WIDTH];
 
-static bool are_whole(operand x, uint32_t n) {
+static bool are_whole(uint32_t x, uint32_t n) {
   for (uint32_t i = 0; i < n; i++) {
     double factor = at(x, i);
     if (!(factor > -2147483648.0 && factor < 2147483648.0)) return false;
@@ -92,23 +77,22 @@ static double whole_sum(const ec_table *matrix, uint32_t n, uint32_t i, uint32_t
 
 /* x (n) times a matrix (n, m), plus m numbers of a Gemm. */
 static void gemm(const ec_step *step) {
-  operand x = operand_at(step->inputs[0]);
-  operand matrix = operand_at(step->inputs[1]);
-  operand plus = operand_at(step->inputs[2]);
-  double *out = ec_arena + step->outputs[0];
+  uint32_t x = step->inputs[0];
+  uint32_t matrix = step->inputs[1];
   uint32_t n = step->sizes[ALONG];
   uint32_t m = step->sizes[COUNT];
-  bool whole = matrix.table && matrix.table->type <= EC_INT32 && are_whole(x, n);
+  const ec_table *table = matrix < EC_ARENA ? 0 : &ec_tables[matrix - EC_ARENA];
+  bool whole = table && table->type <= EC_INT32 && are_whole(x, n);
   for (uint32_t j = 0; j < m; j++) {
-    double sum = 0.0;
+    double sum = whole ? whole_sum(table, n, j, m) : 0.0;
     for (uint32_t i = 0; !whole && i < n; i++) sum += at(x, i) * at(matrix, i * m + j);
-    if (whole) sum = whole_sum(matrix.table, n, j, m);
-    out[j] = step->operator == EC_GEMM ? sum + at(plus, j) : sum;
+    if (step->operator == EC_GEMM) sum += at(step->inputs[2], j);
+    ec_arena[step->outputs[0] + j] = sum;
   }
 }
 
 static void reduce(const ec_step *step) {
-  operand x = operand_at(step->inputs[0]);
+  uint32_t x = step->inputs[0];
   double *out = ec_arena + step->outputs[0];
   uint32_t along = step->sizes[ALONG];
   uint32_t behind = step->sizes[BEHIND];
@@ -126,7 +110,7 @@ static void reduce(const ec_step *step) {
 
 /* The k smallest of each row, in order, and their places; of equal ones the first comes first. */
 static void top_k(const ec_step *step) {
-  operand x = operand_at(step->inputs[0]);
+  uint32_t x = step->inputs[0];
   uint32_t k = step->sizes[COUNT];
   for (uint32_t row = 0; row < step->sizes[BEFORE]; row++) {
     double *values = ec_arena + step->outputs[0] + row * k;
@@ -148,14 +132,13 @@ static void top_k(const ec_step *step) {
 
 /* Indices below 0 count from the end. */
 static void gather(const ec_step *step) {
-  operand x = operand_at(step->inputs[0]);
-  operand indices = operand_at(step->inputs[1]);
+  uint32_t x = step->inputs[0];
   double *out = ec_arena + step->outputs[0];
   uint32_t along = step->sizes[ALONG];
   uint32_t behind = step->sizes[BEHIND];
   for (uint32_t i = 0; i < step->sizes[BEFORE]; i++) {
     for (uint32_t j = 0; j < step->sizes[COUNT]; j++) {
-      double index = at(indices, j);
+      double index = at(step->inputs[1], j);
       uint32_t place = (uint32_t)(index < 0.0 ? index + along : index);
       for (uint32_t l = 0; l < behind; l++) *out++ = at(x, (i * along + place) * behind + l);
     }
@@ -163,14 +146,14 @@ static void gather(const ec_step *step) {
 }
 
 static void pad(const ec_step *step) {
-  operand x = operand_at(step->inputs[0]);
+  uint32_t x = step->inputs[0];
   double *out = ec_arena + step->outputs[0];
   for (uint32_t i = 0; i < step->sizes[ALONG]; i++) out[i] = at(x, i);
-  out[step->sizes[ALONG]] = at(operand_at(step->inputs[2]), 0);
+  out[step->sizes[ALONG]] = at(step->inputs[2], 0);
 }
 
 static void arg_max(const ec_step *step) {
-  operand x = operand_at(step->inputs[0]);
+  uint32_t x = step->inputs[0];
   uint32_t best = 0;
   for (uint32_t i = 1; i < step->sizes[ALONG]; i++) {
     if (at(x, i) > at(x, best)) best = i;

@@ -27,7 +27,7 @@ double ec_logistic(double x);
 double ec_rint(double x);
 
 double ec_exp2(int power);
-int ec_exponent(double x);
+double ec_frexp(double x, int *power); /* x above 0 is a fraction from 0.5 to 1 times 2^power */
 
 /* region.c */
 typedef bool ec_set[EC_ROWS * EC_COLS];
@@ -41,10 +41,9 @@ typedef struct {
 typedef enum { EC_CONTACT, EC_SKIN, EC_LEFT, EC_RIGHT, EC_NO_ZONE } ec_zone_name;
 #define EC_ZONE_WIDTH 8
 
-void ec_active(const uint16_t *counts, const bool *valid, ec_set active);
-bool ec_largest(
-    const ec_set active, const uint16_t *counts, const ec_set previous, ec_region *region);
-void ec_sums(const ec_region *region, int64_t *rows, int64_t *cols);
+void ec_largest(
+    const uint16_t *counts, const bool *valid, const ec_set previous, ec_set active,
+    ec_region *region);
 void ec_zone(
     ec_zone_name zone, const ec_set active, const ec_region *region, const uint16_t *counts,
     int64_t numbers[EC_ZONE_WIDTH]);
@@ -82,10 +81,10 @@ typedef struct {
   uint32_t rows; /* frames that were taken in */
   ec_region region; /* when it was last seen */
   ec_start starts[2];
-  ec_row row[EC_FRAMES];
 } ec_contact;
 
 extern ec_contact ec_now;
+extern ec_row ec_rows[EC_FRAMES];
 int ec_follow(const uint16_t *counts, const bool *valid, double t, const double *joints);
 bool ec_released(double touched_s, double now_s);
 

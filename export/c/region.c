@@ -59,18 +59,17 @@ static bool is_before(component a, component b) {
   return a.peak > b.peak;
 }
 
-void ec_active(const uint16_t *counts, const bool *valid, ec_set active) {
-  for (uint32_t i = 0; i < TAXELS; i++) {
-    active[i] = counts[i] > EC_THRESHOLD_COUNTS && (!valid || valid[i]);
-  }
-}
-
-bool ec_largest(
-    const ec_set active, const uint16_t *counts, const ec_set previous, ec_region *region) {
+/* The active taxels, and their largest region. */
+void ec_largest(
+    const uint16_t *counts, const bool *valid, const ec_set previous, ec_set active,
+    ec_region *region) {
   component best = {0, 0, 0};
   uint16_t best_label = 0;
   uint16_t label = 0;
-  for (uint32_t i = 0; i < TAXELS; i++) labels[i] = 0;
+  for (uint32_t i = 0; i < TAXELS; i++) {
+    active[i] = counts[i] > EC_THRESHOLD_COUNTS && (!valid || valid[i]);
+    labels[i] = 0;
+  }
   for (uint32_t i = 0; i < TAXELS; i++) {
     if (!active[i] || labels[i]) continue;
     component next = flood(i, ++label, active, counts, previous);
@@ -82,7 +81,6 @@ bool ec_largest(
   region->area = best.area;
   region->peak = best.peak;
   for (uint32_t i = 0; i < TAXELS; i++) region->taxels[i] = best.area && labels[i] == best_label;
-  return best.area > 0;
 }
 
 /* The column at which to cut a circle so that the weights' variance is least. */
@@ -90,17 +88,11 @@ static uint32_t best_cut(const int64_t weights[EC_COLS]) {
   int64_t total = 0;
   int64_t first = 0;
   int64_t second = 0;
-  int64_t lowest_col = -1;
-  int64_t highest_col = -1;
   for (int64_t col = 0; col < EC_COLS; col++) {
-    if (weights[col] == 0) continue;
-    if (lowest_col < 0) lowest_col = col;
-    highest_col = col;
     total += weights[col];
     first += col * weights[col];
     second += col * col * weights[col];
   }
-  if (2 * (highest_col - lowest_col) <= EC_COLS) return 0;
   uint32_t best = 0;
   int64_t lowest = total * second - first * first;
   for (int64_t col = 0; col < EC_COLS; col++) {
@@ -116,24 +108,8 @@ static uint32_t best_cut(const int64_t weights[EC_COLS]) {
   return best;
 }
 
-/* Sums of rows and of columns over the region's taxels: area times the centroid. */
-void ec_sums(const ec_region *region, int64_t *rows, int64_t *cols) {
-  int64_t areas[EC_COLS] = {0};
-  *rows = 0;
-  *cols = 0;
-  for (uint32_t i = 0; i < TAXELS; i++) {
-    if (!region->taxels[i]) continue;
-    areas[i % EC_COLS]++;
-    *rows += i / EC_COLS;
-    *cols += i % EC_COLS;
-  }
-  uint32_t cut = EC_WRAPS ? best_cut(areas) : 0;
-  for (uint32_t col = 0; col < cut; col++) *cols += EC_COLS * areas[col];
-  *cols %= (int64_t)EC_COLS * region->area;
-}
-
 /* Largest count, taxels, sum of counts, and the sums of counts times row, column, row squared, row
-   times column, column squared, into numbers that are 0. */
+   times column, column squared. Without counts each taxel counts 1. */
 void ec_zone(
     ec_zone_name zone, const ec_set active, const ec_region *region, const uint16_t *counts,
     int64_t numbers[EC_ZONE_WIDTH]) {
@@ -143,13 +119,14 @@ void ec_zone(
   uint32_t cut = 0;
   if (EC_WRAPS && (zone == EC_CONTACT || zone == EC_SKIN)) {
     int64_t weights[EC_COLS] = {0};
-    for (uint32_t i = 0; i < TAXELS; i++) weights[i % EC_COLS] += taxels[i] ? counts[i] : 0;
+    for (uint32_t i = 0; i < TAXELS; i++) weights[i % EC_COLS] += !taxels[i] ? 0 : counts ? counts[i] : 1;
     cut = best_cut(weights);
   }
+  for (uint32_t i = 0; i < EC_ZONE_WIDTH; i++) numbers[i] = 0;
   for (uint32_t i = 0; i < TAXELS; i++) {
     uint32_t col = i % EC_COLS;
     if (!taxels[i] || col < begin || col >= end) continue;
-    int64_t count = counts[i];
+    int64_t count = counts ? counts[i] : 1;
     int64_t row = i / EC_COLS;
     int64_t turned = col < cut ? col + EC_COLS : col;
     if (count > numbers[0]) numbers[0] = count;
