@@ -30,8 +30,9 @@ from export.c_graph import TYPES, CompiledGraph
 ROOMS = Path(__file__).parent / "c"
 RATE_HZ = 120.0
 """Frames a second for which there is room."""
-CODE_BYTES = 16 * 1024
-"""Of all rooms, by gcc 12 with -O2 for a Cortex-M0+."""
+CODE_BYTES = 28 * 1024
+"""Of all rooms, with small tables and the arithmetic of doubles, by gcc 12 with -O2 for a
+Cortex-M0+."""
 LARGEST = 2**63
 """No product of a frame's sums may reach it."""
 MOST_SUMMED = 128
@@ -72,7 +73,7 @@ def export(
     """
     left_out = ""
     source = Source(model, error)
-    limit = 1024 * flash_kb if flash_kb else source.flash
+    limit = 1024 * (flash_kb or inf)
     if source.flash > limit and error is not None:
         left_out += "; early decisions are left out to fit --flash"
         source = Source(model)
@@ -87,7 +88,7 @@ def export(
             f"{model.path}: takes {source.flash / 1024:.0f} kB of flash in C, above "
             "--flash; export fewer features or recordings"
         )
-    source.write(folder)
+    source.write(Path(folder))
     millions = source.work / 1e6
     return (
         f"{os.fspath(folder)}: {source.flash / 1024:.0f} kB of flash, "
@@ -136,13 +137,12 @@ class Source:
         for owner, names in ((self._layout, OF_LAYOUT), (self._info, OF_INFO)):
             self.values |= {name: getattr(owner, name) or 0 for name in names}
         self.flash = CODE_BYTES
-        self.ram = 0
-        self.work = 0
+        self.ram = 4096
+        self.work = 2500 * self._info.width
         outputs = set(model.outputs) - set(() if doubts else DOUBTS)
         points = range(len(windows_s))[-self._last :]
         room = self._info.width + self._features()
         graph = CompiledGraph(model, outputs, points, room)
-        self._kernels()
         self._skin()
         self._geometry()
         self._graph(graph)
@@ -150,7 +150,7 @@ class Source:
         self._tasks(graph.places, rules)
         self._limits(doubts)
 
-    def write(self, folder: str | os.PathLike[str]) -> None:
+    def write(self, folder: Path) -> None:
         """Write all files, whole or not at all."""
         values = {}
         for name, value in self.values.items():
@@ -160,12 +160,13 @@ class Source:
         with ExitStack() as files:
             for room in ROOMS.iterdir():
                 text = string.Template(room.read_text()).substitute(values)
-                file = files.enter_context(write_whole(Path(folder) / room.name))
+                file = files.enter_context(write_whole(folder / room.name))
                 file.write(text.encode())
                 file.flush()
 
     def _features(self) -> int:
-        """The `ec_feature` of each feature; how many doubles they are measured in."""
+        """The `ec_feature` of each feature, and the tables of the kernels, from which
+        some are computed; how many doubles they are measured in."""
         rows = []
         largest = 0
         for feature, width in zip(self._types, self._info.widths, strict=True):
@@ -187,22 +188,10 @@ class Source:
             ]
             rows.append(row)
         self.values["features"] = rows
-        return largest + (len(measures.QUANTITIES) + 4) * self._frames
-
-    def _kernels(self) -> None:
-        """The tables of the kernels, from which some features are computed."""
         for name in ("taxel_kernels", "zone_kernels"):
             table = self._info.kernels.get(name, KernelTable((), ()))
-            flat: list[int] = []
-            for mix in mixes(len(table.shifts)) if table.shifts else ():
-                flat += [mix.sum(), *np.flatnonzero(mix)]
-            fields = [
-                array("int8_t", table.shifts),
-                array("int32_t", table.biases),
-                array("uint8_t", flat),
-                BIASES.get(len(table.biases), ()),
-            ]
-            self.values[name] = fields
+            self.values[name] = kernel_fields(table)
+        return largest + (len(measures.QUANTITIES) + 4) * self._frames
 
     def _skin(self) -> None:
         """The skin, and what is measured in every frame."""
@@ -216,9 +205,8 @@ class Source:
         spreads = not quantities.isdisjoint(measures.QUANTITIES[6:])
         row = 72 + 64 * max(len(zones), 1) + 8 * self._info.joints
         row += 4 * (pooled + pooled_for_kernels)
-        self.ram += self._frames * row + 8 * layout.alive.size + 2048
+        self.ram += self._frames * row + 8 * layout.alive.size
         self.work += (12000 if spreads else 4000) * self._frames * len(zones)
-        self.work += 2500 * self._info.width
         self.values |= {
             "frames": self._frames,
             "cells": pooled,
@@ -266,7 +254,7 @@ class Source:
         for step in graph.steps:
             is_product = step.operator in ("EC_GEMM", "EC_MATMUL")
             self.work += 16 * prod(step.sizes) if is_product else 400 * max(step.sizes)
-        self.flash += 44 * len(graph.steps)
+        self.flash += 40 * len(graph.steps)
         self.ram += 8 * graph.arena
         self.values |= {"arena": graph.arena, "tables": tables, "steps": graph.steps}
 
@@ -289,16 +277,13 @@ class Source:
                 task.k,
                 indices,
                 [names.index(factor) for factor in task.factors],
-                bool(indices),
             ]
             rows.append(row)
             labels.append(array("char *const", map(quoted, task.labels)))
-        order = sorted(range(len(names)), key=lambda i: bool(tasks[names[i]].factors))
         self.values |= {f"place_{name}": places.get(name, 0) for name in FLAGS}
         self.values |= {
             "most_labels": max(len(task.labels) for task in tasks.values()),
             "tasks": rows,
-            "order": order,
             "labels": labels,
             "task_names": map(quoted, names),
         }
@@ -320,7 +305,8 @@ class Source:
         far = Remoteness((), (), ())
         naming = 255
         if not doubts:
-            novelty = Novelty((inf,) * self._last, (inf,) * self._last)
+            never = (inf,) * self._last
+            novelty = Novelty(never, never)
         for i, name in enumerate(info.tasks if doubts else ()):
             stopping = info.stopping.get(name)
             if stopping is not None and stopping.remoteness is not None:
@@ -373,6 +359,18 @@ def lacks(info: ModelInfo) -> Iterable[str]:
         summed = feature.summary not in ("", "rate")
         if summed and (feature.samples or info.samples) > MOST_SUMMED:
             yield f"{feature.name} sums up more than {MOST_SUMMED} samples"
+
+
+def kernel_fields(table: KernelTable) -> list[object]:
+    """The `ec_kernels` of a table, which may be empty."""
+    mixed = mixes(len(table.shifts)) if table.shifts else ()
+    flat = [n for mix in mixed for n in (mix.sum(), *np.flatnonzero(mix))]
+    return [
+        array("int8_t", table.shifts),
+        array("int32_t", table.biases),
+        array("uint8_t", flat),
+        BIASES.get(len(table.biases), ()),
+    ]
 
 
 def _of_taxels(layout: SkinLayout, cells: Cells) -> Array:

@@ -24,7 +24,7 @@ from edge.tools.replay import Summary, compared, decide
 from edge.tools.slips import counts_text
 from edge.tools.trial_options import add_arm, open_arm
 from edge.touch import measures
-from edge.touch.features import SAMPLES, WINDOW_S
+from edge.touch.features import WINDOW_S
 from edge.writing import check_writable
 from export.api import measure, save
 from train.choose.decision_points import MOST_TRIALS
@@ -42,7 +42,7 @@ from train.tradeoff import front as fronts
 FIXED = ("features", "projection", "scaling", "components", "k", "window", "tasks")
 """Options that would make another model than the one that a point was measured with."""
 FORWARDED = (
-    "features projection scaling components k samples tasks leave_out threshold onset "
+    "features projection scaling components k tasks leave_out threshold onset "
     "release jobs"
 ).split()
 """Options that `fit` takes as they are."""
@@ -82,11 +82,6 @@ OPTIONS: dict[str, dict[str, Any]] = {
     "--projection": {
         "choices": KINDS,
         "help": "fix the projection: principal components or discriminants",
-    },
-    "--samples": {
-        "type": within(int, 2, 1000),
-        "default": SAMPLES,
-        "help": "values of each feature (default: %(default)s)",
     },
     "--scaling": {
         "choices": SCALINGS,

@@ -240,7 +240,7 @@ def sealed(proto):
     return with_digest(data)
 
 
-PAPER = ("--features", "paper", "--projection", "pca", "--samples", "40")
+PAPER = ("--features", "paper", "--projection", "pca")
 """Options of `make export` that fix the paper's features, for tests that need no
 choice."""
 

@@ -129,7 +129,7 @@ static bool ask_all(bool is_short) {
     }
   }
   for (uint32_t i = 0; i < EC_TASKS && !refused; i++) {
-    if (ec_tasks[i].is_product) agree(i);
+    if (ec_tasks[i].indices[0]) agree(i);
   }
   for (uint32_t i = 0; i < EC_TASKS; i++) {
     if (!decided[i]) ask(i, refused, doubts);
@@ -173,7 +173,7 @@ static bool is_decided(uint32_t index) {
     a->flags |= EC_UNCERTIFIED;
     if (point != EC_POINTS - 1) return false;
   }
-  if (task->is_product) return stop_product(task, a);
+  if (task->indices[0]) return stop_product(task, a);
   if (!task->has_rule) return true;
   bool waits = a->flags & EC_UNUSUAL;
   bool sure = confidence(&task->rule_curve, index) >= task->rule_confidence;
@@ -186,9 +186,11 @@ static bool is_decided(uint32_t index) {
 static int decide(ec_event *events, bool is_short) {
   int count = 0;
   bool refused = ask_all(is_short);
-  for (uint32_t order = 0; order < EC_TASKS; order++) {
-    uint32_t i = ec_order[order];
-    if (decided[i] || !(refused || is_decided(i))) continue;
+  for (uint32_t turn = 0; turn < 2 * EC_TASKS; turn++) {
+    uint32_t i = turn % EC_TASKS;
+    bool is_product = ec_tasks[i].indices[0] != 0;
+    if (decided[i] || is_product != (turn >= EC_TASKS)) continue;
+    if (!refused && !is_decided(i)) continue;
     events[count++] = answers[i];
     decided[i] = true;
     waiting--;

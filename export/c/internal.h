@@ -191,13 +191,11 @@ typedef struct {
   } places;
   uint16_t labels;
   uint16_t k;
-  const uint8_t *indices[2]; /* of a product: the factors' label of each label */
+  const uint8_t *indices[2]; /* of a product: the factors' label of each label; or NULL */
   uint8_t factors[2];
-  bool is_product;
 } ec_task;
 
 extern const ec_task ec_tasks[];
-extern const uint8_t ec_order[]; /* tasks, a product behind its factors */
 extern const double ec_typical[]; /* of each decision point */
 extern const double ec_novel[];
 extern const double ec_remote[];

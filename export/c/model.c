@@ -17,7 +17,6 @@ const ec_step ec_steps[] = $steps;
 
 const double ec_windows_s[] = $windows_s;
 const ec_task ec_tasks[] = $tasks;
-const uint8_t ec_order[] = $order;
 const char *const *const ec_labels[] = $labels;
 const char *const ec_task_names[] = $task_names;
 const double ec_typical[] = $typical;

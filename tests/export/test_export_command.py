@@ -61,11 +61,6 @@ def test_it_prints_the_accuracy_of_each_task(printed):
     )
 
 
-def test_the_model_measures_what_its_tasks_take(printed):
-    features = [task.features for task in printed.info.tasks.values()]
-    assert set(printed.info.features) == set().union(*features)
-
-
 @pytest.mark.slow
 def test_the_same_data_gives_the_same_files(recordings, exported, tmp_path):
     export(tmp_path, "--data", recordings, *PAPER, "--jobs", 2)

@@ -16,15 +16,14 @@ SIX = "skin_force right_length left_width skin_slant skin_area contact_area_rate
 
 @pytest.fixture(scope="module")
 def six(recordings, tmp_path_factory):
-    words = "--samples 20 --scaling IV --projection pca --features".split()
+    words = "--scaling IV --projection pca --features".split()
     return export(tmp_path_factory.mktemp("six"), "--data", recordings, *words, *SIX)
 
 
 def test_the_model_says_what_it_measures_and_in_which_units(six):
     info = Model(six / "model.onnx").info
     assert info.features == tuple(SIX)
-    assert info.samples == 20
-    assert info.width == 5 * 20 + 10
+    assert info.width == 5 * 40 + 10
     assert info.units["skin_force"] == "newton"
     assert info.units["contact_area_rate@10"] == "taxel/s"
     assert info.chain is None
@@ -33,9 +32,9 @@ def test_the_model_says_what_it_measures_and_in_which_units(six):
 
 @pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf])
 def test_a_value_that_is_not_finite_is_named_by_its_feature_and_place(six, value):
-    vector = np.zeros(110)
-    vector[105] = value
-    sentence = "value 105 .*, of contact_area_rate@10, is not finite"
+    vector = np.zeros(210)
+    vector[205] = value
+    sentence = "value 205 .*, of contact_area_rate@10, is not finite"
     with pytest.raises(InputError, match=sentence):
         Model(six / "model.onnx").decide(vector)
 

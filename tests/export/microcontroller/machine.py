@@ -126,11 +126,7 @@ def events(model, recording, error=None):
             confidence = math.nan if event.confidence is None else event.confidence
             decision = event.decision
             nearest = 0 if decision is None else int(decision.neighbours[0])
-            stopped = (
-                ("confidence", "window").index(event.stopped_by) + 1
-                if event.stopped_by
-                else 0
-            )
+            stopped = (None, "confidence", "window").index(event.stopped_by)
             task = tasks.index(event.task)
             row = [2, event.onset_s, task, label, event.window_s, confidence, flags]
             rows.append([*row, nearest, stopped])
