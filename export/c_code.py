@@ -226,9 +226,8 @@ class Source:
         angles = layout.column_angles_deg or (0.0,)
         steps = (np.diff([*angles, angles[0]]) + 180.0) % 360.0 - 180.0
         links = []
-        for kind, axis, step, after in (
-            self._info.chain.links if self._info.chain else ()
-        ):
+        chain = self._info.chain
+        for kind, axis, step, after in chain.links if chain else ():
             links.append([axis, np.ravel(step), after, f"EC_{kind.upper()}"])
         self.values |= {
             "along": along,
@@ -256,7 +255,12 @@ class Source:
             self.work += 16 * prod(step.sizes) if is_product else 400 * max(step.sizes)
         self.flash += 40 * len(graph.steps)
         self.ram += 8 * graph.arena
-        self.values |= {"arena": graph.arena, "tables": tables, "steps": graph.steps}
+        self.values |= {
+            "arena": graph.arena,
+            "ram": self.ram,
+            "tables": tables,
+            "steps": graph.steps,
+        }
 
     def _tasks(
         self, places: Mapping[str, int], rules: Mapping[str, StoppingRule | None]

@@ -1,7 +1,6 @@
 /* Decides what a robot's skin touches, from raw counts, with the bits of `edge-classify replay`.
-   One contact at a time; no heap, no recursion, no mathematical library. Its RAM is static: the
-   sizes of ec_rows and ec_arena, and 7 bytes a taxel, which `edge-classify export --c` prints, and a
-   stack of less than 2 kB.
+   One contact at a time; no heap, no recursion, no mathematical library. Its RAM is static: ec_rows,
+   ec_arena and 7 bytes a taxel, and a stack of less than 2 kB. EC_RAM in model.h is their sum.
 
    Compile every .c file of this folder with -std=c99 -ffp-contract=off. */
 #ifndef EDGE_CLASSIFY_H

@@ -38,6 +38,9 @@
 #define EC_FORCE_FLOOR $force_floor
 #define EC_LENGTH_FLOOR $length_floor
 
+/* about so many bytes of RAM: static, and 2 kB of the stack */
+#define EC_RAM $ram
+
 /* the graph, and where it leaves its outputs */
 #define EC_ARENA $arena
 #define EC_STEPS $steps_count

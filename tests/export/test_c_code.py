@@ -367,10 +367,13 @@ def test_what_does_not_fit_the_flash_is_left_out_and_said(early, tmp_path, monke
 
 
 def test_what_cannot_be_written_is_one_sentence_and_leaves_no_file(tmp_path):
-    (tmp_path / "file").touch()
-    with pytest.raises(InputError, match="file: cannot be written: it is no folder"):
-        c_code.export(Model(demo.MODEL), tmp_path / "file")
-    (tmp_path / "c" / "main.c").mkdir(parents=True)
+    model = Model(demo.MODEL)
+    folder = tmp_path / "c"
+    folder.touch()
+    with pytest.raises(InputError, match="c: cannot be written: it is no folder"):
+        c_code.export(model, folder)
+    folder.unlink()
+    (folder / "main.c").mkdir(parents=True)
     with pytest.raises(InputError, match="main.c: cannot be written"):
-        c_code.export(Model(demo.MODEL), tmp_path / "c")
-    assert [path.name for path in (tmp_path / "c").iterdir()] == ["main.c"]
+        c_code.export(model, folder)
+    assert [path.name for path in folder.iterdir()] == ["main.c"]

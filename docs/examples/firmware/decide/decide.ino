@@ -65,6 +65,7 @@ void loop() {
     ec_baseline_above(taxels, 12, values, -1, 4, counts);
     if (!ec_is_touched()) ec_baseline_follow(taxels, 12, values, nullptr, STEP);
     const int count = ec_push(counts, nullptr, t_s, nullptr, events);
+    if (count == EC_BAD_TIME) ec_begin();  // millis() is 0 again after 50 days
     for (int i = 0; i < count; i++) {
       const ec_event &event = events[i];
       if (event.kind != EC_DECIDED_EVENT) continue;
