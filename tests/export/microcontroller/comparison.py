@@ -31,8 +31,9 @@ def assert_same(model, folder, recordings, vectors=(), error=None, board=None):
         questions.append(machine.about_vector(point, vector))
         expected.append(machine.outputs(model, points[point], vector))
     for recording in recordings:
-        kind = machine.VECTORS_OF_RECORDING
-        questions.append(machine.about_recording(kind, recording))
+        questions.append(
+            machine.about_recording(machine.VECTORS_OF_RECORDING, recording)
+        )
         expected.append(machine.vectors(model, points, recording))
     assert same(machine.ask(command, folder, questions), np.concatenate(expected))
     assert_same_events(model, folder, command, recordings, error)
@@ -40,8 +41,9 @@ def assert_same(model, folder, recordings, vectors=(), error=None, board=None):
 
 def assert_same_events(model, folder, command, recordings, error=None):
     """Compare every bit of the events of recordings."""
-    kind = machine.EVENTS_OF_RECORDING
-    questions = [machine.about_recording(kind, recording) for recording in recordings]
+    questions = [
+        machine.about_recording(machine.EVENTS_OF_RECORDING, r) for r in recordings
+    ]
     rows = machine.ask(command, folder, questions).reshape(-1, 9)
     ends = np.flatnonzero(rows[:, 0] == -1.0)
     answers = np.split(rows, ends)[:-1]

@@ -41,18 +41,17 @@ def tools(board):
     cpu, options, machine, code, ram = BOARDS[board]
     gcc = ["arm-none-eabi-gcc", f"-mcpu={cpu}", "-mthumb", *options.split()]
     gcc += ["--specs=rdimon.specs", f"-Wl,--defsym=CODE={code},--defsym=RAM={ram}"]
-    gcc += ["-T", str(HERE / "board.ld"), str(HERE / "startup.c")]
+    gcc += ["-T", HERE / "board.ld", HERE / "startup.c"]
     qemu = f"qemu-system-arm -M {machine} -nographic -semihosting -kernel"
     return gcc, qemu.split()
 
 
 def compiled(folder, board=None):
     """The command that answers `input.bin` in a folder of C."""
-    sources = [*map(str, folder.glob("*.c")), str(HERE / "host.c")]
-    sources = [source for source in sources if Path(source).name != "main.c"]
-    program = str(folder / f"answer-{board or 'host'}")
+    rooms = [path for path in folder.glob("*.c") if path.name != "main.c"]
+    program = folder / f"answer-{board or 'host'}"
     gcc, command = tools(board) if board else (["gcc", *SANITIZED], [])
-    words = [*gcc, *COMMON, "-I", str(folder), *sources, "-o", program]
+    words = [*gcc, *COMMON, "-I", folder, *rooms, HERE / "host.c", "-o", program]
     subprocess.run(words, check=True)
     return [*command, program]
 

@@ -64,6 +64,7 @@ def on_the_edges(layout):
     frames[0, :10, 2, 1] = layout.onset
     frames[0, 10:, 2, 1] = layout.onset + 1
     frames[1, :, 1, 1] = frames[1, :, 5, 3] = count  # equal regions
+    frames[1, 21:, 5, 3] += 1  # after a frame without contact
     frames[2, :, 2, [0, 1, -1]] = count  # about the seam
     frames[3, ::4, 2, 0] = frames[3, 1::4, 2, 0] = count  # half-way around and back
     frames[3, 2::4, 2, layout.cols // 2] = frames[3, 3::4, 2, layout.cols // 2] = count
@@ -71,7 +72,7 @@ def on_the_edges(layout):
     frames[4, :, [0, 3, 6], [0, 1, 2]] = growing.T  # on a line
     frames[5:, :, 2, 1:3] = growing[:, 1:]
     frames[5, [30, 60, 120]] = 0  # lifted off as a window ends
-    frames[6, 20] = 0  # as it is released
+    frames[[1, 6], 20] = 0  # as it is released
     t[6, 20:] += layout.release_s - 0.01 - 5e-7
     t[7, 1:] = np.arange(1, 140) * 0.6 / 39 + 5e-7  # as kernels are taken
     joints = np.linspace(0, [2e5, -3e4, 1, 2, 3], 141)
