@@ -11,11 +11,14 @@
 
 /* A sum that is fused with its product has other bits. gcc knows no pragma against it: where the
    processor has such an instruction, say that -ffp-contract=off is given. */
-#if defined(__FAST_MATH__) || (defined(__FP_FAST_FMA) && !defined(EC_NO_CONTRACTION))
-#error "compile with -ffp-contract=off -DEC_NO_CONTRACTION and without -ffast-math"
+#if defined(__FP_FAST_FMA) && !defined(EC_NO_CONTRACTION)
+#error "compile with -ffp-contract=off -DEC_NO_CONTRACTION"
 #endif
-#if FLT_EVAL_METHOD != 0
-#error "doubles must be computed as doubles, not in wider registers"
+#if defined(__ASSOCIATIVE_MATH__) || defined(__RECIPROCAL_MATH__) || __FINITE_MATH_ONLY__
+#error "compile without -ffast-math and the options of which it consists"
+#endif
+#if DBL_MANT_DIG != 53 || FLT_EVAL_METHOD != 0
+#error "doubles must have 64 bits, and be computed as these, not in wider registers"
 #endif
 
 /* elementary.c: edge/elementary.py */

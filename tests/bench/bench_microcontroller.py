@@ -16,6 +16,7 @@ from sklearn.preprocessing import MinMaxScaler
 from export import c_code
 from tests.bench import tables
 from tests.export.microcontroller import machine
+from tests.export.test_c_code import needs_qemu
 from tests.hard_cases.models import Ours
 from train.data.dataset import load_trials
 from train.model.pipeline import Choice
@@ -57,6 +58,7 @@ def answered(folder, model, vectors):
     return labels, [code + data, data + zeros, instructions / len(vectors)]
 
 
+@needs_qemu
 def bench_microcontroller(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)  # emlearn compiles there
     known, X = trials(tmp_path / "known", 2012, 5)
@@ -77,7 +79,7 @@ def bench_microcontroller(tmp_path, monkeypatch):
         for model, (vectors, of_python) in answers.items():
             labels, sizes = answered(tmp_path, model, vectors)
             right = names[np.array(labels, int)] == others.labels(task)
-            numbers = np.subtract(sizes, nothing).round().astype(int)
+            numbers = np.subtract(sizes, nothing).astype(int)
             row = {"task": task, "model": model}
             row |= zip(("flash", "RAM", "instructions"), numbers, strict=True)
             row["as in Python"] = f"{np.mean(labels == of_python):.1%}"

@@ -317,7 +317,8 @@ def test_a_frame_that_cannot_be_taken_in_is_an_error(tmp_path):
 @needs_gcc
 def test_options_that_change_bits_do_not_compile(tmp_path):
     c_code.export(Model(demo.MODEL), tmp_path)
-    for option in ("-ffast-math", "-mfma"):
+    options = "-ffast-math -funsafe-math-optimizations -ffinite-math-only -mfma"
+    for option in options.split():
         words = ["gcc", option, "-c", "graph.c", "-o", "graph.o"]
         ended = subprocess.run(words, cwd=tmp_path, capture_output=True, check=False)
         assert b"#error" in ended.stderr
