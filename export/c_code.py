@@ -25,7 +25,7 @@ from edge.touch.kernels import BIASES, KernelTable, mixes
 from edge.touch.layout import SkinLayout
 from edge.touch.zones import Zones
 from edge.writing import write_whole
-from export.c_graph import TYPES, CompiledGraph
+from export.c_graph import CompiledGraph
 
 ROOMS = Path(__file__).parent / "c"
 RATE_HZ = 120.0
@@ -246,7 +246,7 @@ class Source:
         tables = []
         for table in graph.tables:
             kind = table.dtype.name
-            values = array(TYPES[kind], table.reshape(-1))
+            values = array(f"{kind}_t", table.reshape(-1))
             stride = (table.ndim - 1) * table.shape[-1]
             tables.append([values, stride, f"EC_{kind.upper()}"])
             self.flash += table.nbytes
@@ -360,8 +360,8 @@ def lacks(info: ModelInfo) -> Iterable[str]:
     if (total * max(2 * layout.cols, layout.rows)) ** 2 >= LARGEST:
         yield f"the sums of {layout.rows} x {layout.cols} taxels exceed 64 bits"
     for feature in feature_types(info.features):
-        summed = feature.summary not in ("", "rate")
-        if summed and (feature.samples or info.samples) > MOST_SUMMED:
+        samples = feature.samples or info.samples
+        if feature.summary not in ("", "rate") and samples > MOST_SUMMED:
             yield f"{feature.name} sums up more than {MOST_SUMMED} samples"
 
 

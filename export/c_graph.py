@@ -17,14 +17,8 @@ from edge.model.onnx_file import Node
 from export.build import smallest
 
 ELEMENT_WISE = "Add Sub Mul Div Max LessOrEqual Where Clip Round Sqrt Squeeze".split()
-TYPES = {
-    "int8": "int8_t",
-    "int16": "int16_t",
-    "int32": "int32_t",
-    "float32": "float",
-    "float64": "double",
-}
-"""{type of a table: that in C}, from the smallest."""
+TYPES = "int8 int16 int32 float32 float64".split()
+"""Of tables, from the smallest."""
 
 
 class Step(NamedTuple):
@@ -97,15 +91,24 @@ class CompiledGraph:
         return self._values[0][name].shape
 
     def _place(self, nodes: Sequence[Node], outputs: Iterable[str]) -> None:
-        """Give each value a place in the arena, from its first use to its last."""
+        """Give each value a place in the arena, from its first use to its last. What is
+        computed number by number may take the place of what it is computed from.
+        """
         last = {}
         for i, node in enumerate(nodes):
             last.update(dict.fromkeys([*node.inputs, *node.outputs], i))
         last.update(dict.fromkeys(outputs, len(nodes)))
         spans = {"features": (0, self._shape("features")[1])}
         for i, node in enumerate(nodes):
+            shape = self._shape(node.outputs[0])
+            size = prod(shape)
+            in_place = node.operator in ELEMENT_WISE
+            spans = {
+                name: span
+                for name, span in spans.items()
+                if last[name] >= i + (in_place and self._shape(name) == shape)
+            }
             for name in node.outputs:
-                size = prod(self._shape(name))
                 begin = 0
                 for low, high in sorted(spans.values()):
                     if low < begin + size:
@@ -113,7 +116,6 @@ class CompiledGraph:
                 spans[name] = begin, begin + size
                 self.places[name] = begin
                 self.arena = max(self.arena, begin + size)
-            spans = {name: span for name, span in spans.items() if last[name] > i}
 
     def _step(self, node: Node) -> Step:
         """The step of a node."""

@@ -50,7 +50,9 @@ DECISION_POINTS = "0.2:1.2:0.1"
 LONGEST_S = 60.0
 """Longest window, and longest time that a contact may be away."""
 count = within(int, 1, 1_000_000)
-"""The type of an option that takes a number of things."""
+counts = within(int, 0, 65534)
+seconds = within(float, 0.01, LONGEST_S)
+"""The types of options that take a number of things, counts of a taxel, or seconds."""
 OPTIONS: dict[str, dict[str, Any]] = {
     # The recordings, the model and its tasks, and the settings that can be held fixed.
     "--data": {
@@ -108,7 +110,7 @@ OPTIONS: dict[str, dict[str, Any]] = {
         "help": "for a first look: few candidates, five folds",
     },
     "--window": {
-        "type": within(float, 0.01, LONGEST_S),
+        "type": seconds,
         "help": "seconds from onset that a decision is based on (default: "
         f"{WINDOW_S:g}, or more if touches last longer and a longer window is much more "
         "accurate)",
@@ -121,15 +123,15 @@ OPTIONS: dict[str, dict[str, Any]] = {
         "the model would exceed 1.9 MB)",
     },
     "--threshold": {
-        "type": within(int, 0, 65534),
+        "type": counts,
         "help": "counts above which a taxel is in contact",
     },
     "--onset": {
-        "type": within(int, 0, 65534),
+        "type": counts,
         "help": "counts above which a contact begins",
     },
     "--release": {
-        "type": within(float, 0.01, LONGEST_S),
+        "type": seconds,
         "help": "seconds that a contact may be away and go on (default: the skin's, or longer "
         "if many touches are felt in pieces and that is much more accurate)",
     },

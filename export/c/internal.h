@@ -150,6 +150,8 @@ extern const ec_kernels ec_taxel_kernels;
 extern const ec_kernels ec_zone_kernels;
 
 /* model.c: the numbers of graph.c, each in the smallest type that holds it exactly. */
+typedef float float32_t;
+typedef double float64_t;
 enum { EC_INT8, EC_INT16, EC_INT32, EC_FLOAT32, EC_FLOAT64 };
 
 typedef struct {
