@@ -7,12 +7,17 @@ from scipy.special import expit
 from train.model.curves import DOUBT, LEAST_DOUBT, Curve, Evidence, cross_fitted
 
 
+def fitted(margins, excess, right):
+    """The curve of answers that count alike."""
+    return Curve.of(margins, excess, right, np.ones(margins.shape))
+
+
 def test_finds_the_curve_that_drew_the_outcomes():
     rng = np.random.default_rng(0)
     margins = rng.normal(scale=2.0, size=40_000)
     excess = rng.exponential(0.5, size=len(margins))
     chance = expit(0.5 * margins + 1.0 - 0.8 * excess)
-    curve = Curve.of(margins, excess, rng.random(len(margins)) < chance)
+    curve = fitted(margins, excess, rng.random(len(margins)) < chance)
     assert curve.slope == pytest.approx(0.5, abs=0.05)
     assert curve.intercept == pytest.approx(1.0, abs=0.05)
     assert curve.doubt == pytest.approx(0.8, abs=0.08)
@@ -27,7 +32,7 @@ def test_equal_outcomes_and_one_far_margin_have_the_best_curve(
     right,
 ):
     outcomes = np.full(len(margins), right)
-    curve = Curve.of(margins, np.zeros(len(margins)), outcomes)
+    curve = fitted(margins, np.zeros(len(margins)), outcomes)
     mean = margins.mean()
     spread = margins.std() or 1.0
     errors = expit(curve.slope * margins + curve.intercept) - right
@@ -39,21 +44,26 @@ def test_equal_outcomes_and_one_far_margin_have_the_best_curve(
 
 def test_a_larger_margin_never_speaks_against_a_label():
     margins = np.arange(100.0)
-    curve = Curve.of(margins, np.zeros(100), margins < 50)
+    curve = fitted(margins, np.zeros(100), margins < 50)
     assert 0.0 < curve.slope < 1e-3
 
 
 def test_novelty_never_speaks_for_a_label():
     excess = np.linspace(0.0, 1.0, 400)
-    curve = Curve.of(np.zeros(400), excess, excess > 0.5)
+    curve = fitted(np.zeros(400), excess, excess > 0.5)
     assert curve.doubt == LEAST_DOUBT
 
 
 def test_without_novel_trials_the_odds_fall_as_assumed():
     rng = np.random.default_rng(3)
     excess = np.full(50, 0.2)
-    curve = Curve.of(rng.normal(size=50), excess, rng.random(50) < 0.8)
+    curve = fitted(rng.normal(size=50), excess, rng.random(50) < 0.8)
     assert curve.doubt == pytest.approx(DOUBT)
+
+
+def evidence_of(margins, excess, honest, known, weights):
+    """Of answers whose right ones make no curve here."""
+    return Evidence(margins, excess, honest, honest, known, weights)
 
 
 @pytest.mark.parametrize("share", [0.0, 0.3, 0.9])
@@ -62,7 +72,11 @@ def test_the_mean_probability_is_moved_to_a_share_even_far_away(share):
     margins = 100.0 + rng.normal(size=200)
     excess = rng.exponential(size=200)
     known = np.linspace(0.5, 1.0, 200)
-    curve = Curve(2.0, 0.5, 1.0).with_mean(margins, excess, share, known)
+    honest = np.arange(200) < share * 200
+    ones = np.ones(200)
+    curve = Curve(2.0, 0.5, 1.0).with_mean_of(
+        evidence_of(margins, excess, honest, known, ones)
+    )
     assert curve.slope == 2.0
     assert curve.doubt == 1.0
     expected = min(max(share, 0.5 / 200), 0.75 - 0.5 / 200)
@@ -72,22 +86,49 @@ def test_the_mean_probability_is_moved_to_a_share_even_far_away(share):
 
 def test_a_mean_may_lie_beyond_the_greatest_doubt():
     excess = np.repeat([0.0, 690.0], 50)
-    level = np.zeros(100)
-    curve = Curve(1.0, 0.0, 1.0).with_mean(level, excess, 0.7, np.ones(100))
-    assert curve.probabilities(level, excess).mean() == pytest.approx(0.7)
+    honest = np.arange(100) < 70
+    ones = np.ones(100)
+    curve = Curve(1.0, 0.0, 1.0).with_mean_of(
+        evidence_of(np.zeros(100), excess, honest, ones, ones)
+    )
+    assert curve.probabilities(np.zeros(100), excess).mean() == pytest.approx(0.7)
 
 
 def test_a_curve_of_a_point_has_the_mean_of_the_honest_answers_there():
     rng = np.random.default_rng(6)
     numbers = rng.random((3, 2, 80))
     right, honest = rng.random((2, 2, 80)) < [[[0.9]], [[0.6]]]
-    evidence = Evidence(*numbers[:2], right, honest, 0.8 + 0.2 * numbers[2])
+    known = 0.8 + 0.2 * numbers[2]
+    evidence = Evidence(*numbers[:2], right, honest, known, np.ones((2, 80)))
     for point in range(2):
-        margins = evidence.margins[point]
-        excess = evidence.excess[point]
-        mean = honest[point].mean(), evidence.known[point]
-        curve = Curve.of(margins, excess, right[point])
-        assert evidence.at(point).curve() == curve.with_mean(margins, excess, *mean)
+        at_point = evidence.at(point)
+        curve = at_point.curve()
+        before = fitted(at_point.margins, at_point.excess, right[point])
+        assert (curve.slope, curve.doubt) == (before.slope, before.doubt)
+        likely = curve.probabilities(at_point.margins, at_point.excess)
+        assert (likely * known[point]).mean() == pytest.approx(honest[point].mean())
+
+
+def test_an_answer_of_weight_three_counts_as_three():
+    rng = np.random.default_rng(7)
+    margins, excess = rng.random((2, 60))
+    right = rng.random(60) < 0.7
+    weights = np.where(np.arange(60) < 20, 3.0, 1.0)
+    # The spread is that of the answers, whatever they count.
+    margins[20:40] = margins[40:] = margins[:20]
+    excess[20:40] = excess[40:] = excess[:20]
+    weighted = Evidence(margins, excess, right, right, np.ones(60), weights)
+    thrice = np.repeat(np.arange(60), weights.astype(int))
+    ones = np.ones(100)
+    repeated = evidence_of(margins[thrice], excess[thrice], right[thrice], ones, ones)
+    curves = weighted.curve(), repeated.curve()
+    for name in ("slope", "doubt"):
+        assert getattr(curves[0], name) == pytest.approx(getattr(curves[1], name))
+    means = [
+        evidence.mean(curve.probabilities(evidence.margins, evidence.excess))
+        for evidence, curve in zip((weighted, repeated), curves, strict=True)
+    ]
+    assert means[0] == pytest.approx(means[1])
 
 
 def test_a_folds_confidences_are_by_the_other_folds_tested_trials_alone():
@@ -101,6 +142,6 @@ def test_a_folds_confidences_are_by_the_other_folds_tested_trials_alone():
     for fold in range(3):
         inside = folds == fold
         others = tested & ~inside
-        curve = Curve.of(margins[:, others], excess[:, others], right[:, others])
+        curve = fitted(margins[:, others], excess[:, others], right[:, others])
         expected = curve.probabilities(margins[:, inside], excess[:, inside])
         assert confidences[:, inside].tolist() == expected.tolist()
