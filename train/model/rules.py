@@ -179,7 +179,7 @@ def agreeing(
         for factor, of_factor in followed.items():
             agreed[factor].append(of_factor)
     if not of_product:
-        of_product = [StoppingRule(1.0, float(seconds[-1]), NEVER, len(seconds) - 1)]
+        of_product = [replace(rules[product][0], error=1.0)]
     return {product: of_product, **agreed}
 
 

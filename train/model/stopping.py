@@ -337,13 +337,14 @@ class SequentialClassifier:
         stopping = {}
         for task, tests in self._tested.items():
             right = answered.right[task][:, tests]
+            ones = np.ones(right.shape)
             evidence = Evidence(
                 answered.margins[task][:, tests],
                 self._excess[:, tests],
                 right,
                 self.right_[task][:, tests],
-                known=np.ones(right.shape),
-                weights=np.ones(right.shape),
+                known=ones,
+                weights=ones,
             )
             together = evidence.curve()
             early = together

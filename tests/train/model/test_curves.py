@@ -6,7 +6,14 @@ import numpy as np
 import pytest
 from scipy.special import expit
 
-from train.model.curves import DOUBT, LEAST_DOUBT, Curve, Evidence, cross_fitted
+from train.model.curves import (
+    DOUBT,
+    LEAST_DOUBT,
+    WITHHELD,
+    Curve,
+    Evidence,
+    cross_fitted,
+)
 
 
 def fitted(margins, excess, right):
@@ -72,7 +79,8 @@ def test_the_mean_probability_is_moved_to_a_share_even_beyond_the_greatest_doubt
     evidence = Evidence(margins, excess, honest, honest, known, np.ones(200))
     curve = Curve(2.0, 0.5, 1.0).with_mean_of(evidence)
     assert (curve.slope, curve.doubt) == (2.0, 1.0)
-    expected = min(max(share, 0.5 / 200), 0.75 - 0.5 / 200)
+    part = share * (1.0 - WITHHELD * 0.25)
+    expected = min(max(part, 0.0025), 0.7475)
     mean = (curve.probabilities(margins, excess) * known).mean()
     assert mean == pytest.approx(expected)
 
@@ -86,7 +94,8 @@ def test_a_curve_of_a_point_has_the_mean_of_the_honest_answers_there():
     for point in range(2):
         curve = evidence.at(point).curve()
         likely = curve.probabilities(evidence.margins[point], evidence.excess[point])
-        assert (likely * known[point]).mean() == pytest.approx(honest[point].mean())
+        mean = honest[point].mean() * (1.0 - WITHHELD * (1.0 - known[point].mean()))
+        assert (likely * known[point]).mean() == pytest.approx(mean)
 
 
 def test_an_answer_of_weight_two_counts_as_two():

@@ -170,7 +170,7 @@ class TestProduct:
         slow = StoppingRule(0.2, 1.2, 0.95, 2)
         product, factor = self.agreeing(strict, slow)
         assert factor == [strict]
-        assert product == [StoppingRule(1.0, 1.2, NEVER, 2)]
+        assert product == [replace(slow, error=1.0)]
         window = StoppingRule(strict.error, 1.2, NEVER, 2)
         _, factor = self.agreeing(strict, window)
         assert factor == [window]
