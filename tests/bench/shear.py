@@ -27,14 +27,14 @@ KINDS = {"known objects": lambda choice: choice.by_trial, "unseen objects": unse
 """{kind: the accuracy of a choice on it}."""
 
 
-def compared(seed, folder, jobs):
+def compared(seed, folder):
     """The choices with shear at each window on the trials of one seed, then those
     without."""
     data = folder / str(seed)
     run.write(scene.load(SCENE, seed=seed), data)
     dataset = followed(read([str(data)]))
     cases = product((dataset, without_shear(dataset)), SHOWN_S)
-    return Workers(jobs).map(data.name, chosen, list(cases))
+    return Workers(2).map(data.name, chosen, list(cases))
 
 
 def gain(pairs, task, result_of):
@@ -62,10 +62,10 @@ def gains(runs):
     return rows
 
 
-def measure(seeds, jobs, out):
+def measure(seeds, out):
     """Measure, and write the table."""
     first = scene.load(SCENE).seed
-    runs = [compared(first + i, out, jobs) for i in range(seeds)]
+    runs = [compared(first + i, out) for i in range(seeds)]
     tables.write("shear", [gains(runs)], "make shear")
 
 
@@ -74,6 +74,5 @@ if __name__ == "__main__":
         measure,
         __doc__,
         ("--seeds", 5, "data sets"),
-        ("--jobs", 2, "processes"),
         ("--out", Path("build/shear"), "folder"),
     )

@@ -11,7 +11,16 @@ sure if it has neither and a confidence of 95 % or more.
 "held" says whether a shift is told at least as the user was promised: most of its
 touches are in doubt, or the answers without a doubt are right about as often as those
 on touches that are not shifted. "1 of 20" says whether at most one of 20 sure answers
-is wrong, or one in all.
+is wrong, or one in all, or why it cannot be seen. The reasons were measured on 140
+touches:
+
+- By an arm of half the stiffness, 30 of 32 things that were surely called fixed moved
+  less than the scene's 20 mm, most of them 0. The label is that of the usual arm.
+- By an arm of twice the stiffness, the joints give way by 0.32 to 0.36 rad against a
+  fixed hedge, under a usual force. In training they did by 0.27 to 0.32 rad, and by more
+  for movable things alone.
+- The unmet things that are surely named are boxes and foam that are called "cardboard
+  box" and "foam block". Each is less remote than half of the touches of known things.
 """
 
 from dataclasses import replace
@@ -43,10 +52,13 @@ WORSE = 0.05
 """By so much the answers without a doubt may be worse than those on usual touches."""
 UNSURE = 0.5
 SURE = 0.95
-LATE = ((10, 0), (0, 0))
-"""Frames before and after, and joints, by which late angles are padded."""
-FEW = 1 / 20
-"""Share of the sure answers that may be wrong."""
+NEVER_MET = "things never met, so every name is wrong"
+UNSEEN = {
+    "arm stiffness x 0.5": "no: this arm leaves the things where they are",
+    "arm stiffness x 2": "no: foliage gives way to this arm as movable things did",
+    NEVER_MET: "no: some feel as things of their kind in training do",
+}
+"""{shift: why nothing tells it}."""
 
 
 def counts(change):
@@ -129,7 +141,9 @@ SHIFTS = {
     },
     "joint angles stop after 0.1 s": stop_after(10),
     "joint angles stop after 0.5 s": stop_after(50),
-    "joint angles 0.1 s late": joints(lambda q: np.pad(q, LATE, "edge")[:-10]),
+    "joint angles 0.1 s late": joints(
+        lambda q: np.pad(q, ((10, 0), (0, 0)), "edge")[:-10]
+    ),
     "joint angles of the other sign": joints(lambda q: -q),
 }
 SPEEDS = (0.5, 0.7, 0.8, 0.9, 1.1, 1.2, 1.3, 2.0)
@@ -234,26 +248,24 @@ def row(name, task, judged, usual):
         "held": "yes" if is_told(judged, usual) else "no",
         "sure": sure,
         "wrong and sure": wrong,
-        "1 of 20": "yes" if wrong <= max(sure / 20, 1) else "no",
+        "1 of 20": "yes" if wrong <= max(sure / 20, 1) else UNSEEN.get(name, "no"),
     }
 
 
-def measure(model, trials):
+def measure(model):
     """Measure, and write the table."""
     loaded = Model(model)
-    scene = scenes.load(SCENE, seed=FRESH_SEED, count=trials)
+    scene = scenes.load(SCENE, seed=FRESH_SEED, count=5)
     fresh = fresh_touches(scene)
     cases = {name: partial(map, shift, fresh) for name, shift in SHIFTS.items()}
     for name, changed in scene_changes(scene).items():
         cases[name] = partial(redone, changed, fresh)
     objects = scenes.load(STRANGE, seed=FRESH_SEED).objects
     never_met = replace(scene, objects=objects, trials={**scene.trials, "count": 1})
-    cases["things never met, so every name is wrong"] = partial(
-        fresh_touches, never_met
-    )
+    cases[NEVER_MET] = partial(fresh_touches, never_met)
     rows = []
     usual = {}
-    for name, shifted in bar(cases.items(), desc="shifts", total=len(cases)):
+    for name, shifted in bar(cases.items(), total=len(cases)):
         for task, judged in answers(loaded, shifted()).items():
             accuracy = usual.setdefault(task, trusted(judged))
             rows.append(row(name, task, judged, accuracy))
@@ -265,5 +277,4 @@ if __name__ == "__main__":
         measure,
         __doc__,
         ("--model", Path, "model.onnx"),
-        ("--trials", 5, "of each object"),
     )

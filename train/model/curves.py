@@ -25,6 +25,12 @@ DOUBT_PULL = 10.0
 held-out trials are as novel as what a robot may meet."""
 LEAST_DOUBT = 0.5
 """The odds fall at least by the root of the novelty, for the same reason."""
+WITHHELD = 0.5
+"""Part of the mean confidence that doubt about the thing takes from known things, and
+that is not given back. With all of it given back, curves rise so far that things that
+were never met are surely named too: 17 % of their touches with more than 0.9 instead of
+12 %. With none, known things have a calibration error of 0.07 instead of 0.05 (cody18, 14
+full exports without four objects)."""
 LEAST_SLOPE = 1e-3
 """Smallest slope a standard deviation: a larger margin never makes a label less
 likely."""
@@ -48,6 +54,7 @@ class Curve:
         margins: Floats,
         excess: Floats,
         right: Booleans,
+        weights: Floats,
     ) -> Curve:
         """The most likely curve for some answers; arrays of one shape."""
         columns = np.stack([margins.ravel(), -excess.ravel()], axis=1)
@@ -58,28 +65,25 @@ class Curve:
         constant = np.ones((len(columns), 1))
         scaled = np.hstack([(columns - middle) / spread, constant])
         prior = np.array([1.0, DOUBT * spread[1], 0.0])
-        solution = _logistic(scaled, right.ravel(), prior)
+        solution = _logistic(scaled, right.ravel(), weights.ravel(), prior)
         slopes = np.maximum(solution[:2], LEAST_SLOPE) / spread
         intercept = float(solution[2] - slopes @ middle)
         return cls(float(slopes[0]), intercept, max(float(slopes[1]), LEAST_DOUBT))
 
-    def with_mean(
-        self,
-        margins: Floats,
-        excess: Floats,
-        share: float,
-        known: Floats,
-    ) -> Curve:
-        """The curve with the intercept at which the mean probability is `share`, each
-        times that of `known`."""
-        half_a_trial = 0.5 / margins.size
-        most = float(known.mean()) - half_a_trial
-        target = min(max(share, half_a_trial), most)
+    def with_mean_of(self, evidence: Evidence) -> Curve:
+        """The curve with the intercept at which the mean probability is the share of
+        honest answers that are right, but for what is `WITHHELD`, and within half an
+        answer of the possible."""
+        margins, excess = evidence.margins, evidence.excess
+        half_an_answer = 0.5 / margins.size
+        known = evidence.mean(evidence.known)
+        share = evidence.mean(evidence.honest) * (1.0 - WITHHELD * (1.0 - known))
+        target = min(max(share, half_an_answer), known - half_an_answer)
 
         def surplus(shift: float) -> float:
             shifted = replace(self, intercept=self.intercept + shift)
-            probabilities = shifted.probabilities(margins, excess) * known
-            return float(probabilities.mean()) - target
+            probabilities = shifted.probabilities(margins, excess)
+            return evidence.mean(probabilities * evidence.known) - target
 
         logits = self.slope * margins + self.intercept - self.doubt * excess
         reach = 50.0 + float(np.abs(logits).max(initial=0.0))
@@ -104,6 +108,7 @@ class Evidence:
         honest: whether those are right whose settings were chosen without the trials.
         known: probability that the thing is one of those in training, by which that of
             the curve is multiplied.
+        weights: how much each answer counts.
     """
 
     margins: Floats
@@ -111,12 +116,16 @@ class Evidence:
     right: Booleans
     honest: Booleans
     known: Floats
+    weights: Floats
 
     def curve(self) -> Curve:
         """The curve of the answers, with the mean probability of honest ones."""
-        curve = Curve.of(self.margins, self.excess, self.right)
-        share = float(self.honest.mean())
-        return curve.with_mean(self.margins, self.excess, share, self.known)
+        curve = Curve.of(self.margins, self.excess, self.right, self.weights)
+        return curve.with_mean_of(self)
+
+    def mean(self, values: Booleans | Floats) -> float:
+        """The weighted mean of values in the shape of the answers."""
+        return float(np.average(values, weights=self.weights))
 
     def at(self, point: int) -> Evidence:
         """The evidence at one decision point."""
@@ -131,21 +140,24 @@ class Evidence:
 def _logistic(
     columns: Floats,
     right: Booleans,
+    weights: Floats,
     prior: Floats,
 ) -> Floats:
-    """(3,) weights of columns (m, 3) for the log odds of being right."""
+    """(3,) coefficients of columns (m, 3) for the log odds of being right, by answers
+    of some weights (m,)."""
     solution = prior
     pull = np.array([PULL, DOUBT_PULL, PULL])
 
     def loss(parameters: Floats) -> float:
         logits = columns @ parameters
-        log_loss = np.logaddexp(0.0, np.where(right, -logits, logits)).sum()
+        log_loss = weights @ np.logaddexp(0.0, np.where(right, -logits, logits))
         return float(log_loss + 0.5 * pull @ np.square(parameters - prior))
 
     for _ in range(500):
         p = expit(columns @ solution)
-        gradient = columns.T @ (p - right) + pull * (solution - prior)
-        hessian = (columns * (p * (1.0 - p))[:, None]).T @ columns + np.diag(pull)
+        gradient = columns.T @ (weights * (p - right)) + pull * (solution - prior)
+        spread = weights * p * (1.0 - p)
+        hessian = (columns * spread[:, None]).T @ columns + np.diag(pull)
         step = np.linalg.solve(hessian, gradient)
         # Far from the optimum, whole steps may go back and forth for ever. Near it,
         # they converge, and rounding hides what the loss gains.
@@ -170,7 +182,13 @@ def cross_fitted(
     for fold in range(int(folds.max()) + 1):
         left_out = folds == fold
         outside = tested & ~left_out
-        curve = Curve.of(margins[:, outside], excess[:, outside], right[:, outside])
+        answered = right[:, outside]
+        curve = Curve.of(
+            margins[:, outside],
+            excess[:, outside],
+            answered,
+            np.ones(answered.shape),
+        )
         confidences[:, left_out] = curve.probabilities(
             margins[:, left_out],
             excess[:, left_out],

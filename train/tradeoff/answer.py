@@ -173,7 +173,10 @@ GLOSSARY = {
     "unseen objects": (
         "The accuracy if all trials of an object are held out together."
     ),
-    "confidence": "The calibrated probability that the label is right.",
+    "confidence": (
+        "The calibrated probability that the label is right, if the thing is one of "
+        "those in training."
+    ),
     "certified": (
         "An error rate is certified if an exact binomial test on calibration trials "
         "shows, with 90 % confidence, that decisions on contacts like the trained ones "
