@@ -12,7 +12,7 @@ from edge.config import ConfigTable
 from edge.touch.arm import Chain
 from edge.touch.layout import SkinLayout
 from train.simulate.arm import Array, Kinematics
-from train.simulate.schema import EFFECTS, Field
+from train.simulate.schema import EFFECTS, RATE_DEG_S, Field
 
 
 @dataclass(frozen=True)
@@ -180,7 +180,8 @@ class Scene:
         values = {"lead_s": self.lead, "taxel_n_m": self.taxel_n_m}
         if self.spread.get("travel_s"):
             values["travel_s"] = Value(self.travel_s, self.travel_s)
-        return values
+        speeds = [key for key in self.spread if key.startswith(RATE_DEG_S)]
+        return {**values, **dict.fromkeys(speeds, Value(0.0, 0.0))}
 
     @property
     def rate_hz(self) -> float:

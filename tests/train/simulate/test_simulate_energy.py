@@ -87,9 +87,9 @@ class Ledger:
         """Book the work of this step, for the trials that took it."""
         t = active.batch
         if self.q is None:
-            self.q = t.everyone.equilibrium(0.0) - t.joints.lag
+            self.q = t.everyone.equilibrium(0.0) - t.arm.lag
             self.slide = np.zeros(t.n)
-            self.v = np.broadcast_to(t.joints.rate, t.arm.q.shape)
+            self.v = t.arm.rate
             self.speed = np.zeros(t.n)
         if self.meddle:
             self.meddle(t)
