@@ -174,6 +174,7 @@ CONTACT_EFFECTS = {
     "pop": Effect(families=("bubbles",)),
     "stems": Effect(families=("foliage",)),
     "upright": Effect(needs=("stems",), keys=("stem_height_m",)),
+    "strike": Effect(needs=("stems",), keys=("stem_kg",)),
     "tilt": Effect(families=("rigid", "foam", "pillow", "bubbles")),
     "relaxation": Effect(families=ELASTIC),
     # loss_s: dashpot by stiffness

@@ -20,6 +20,7 @@ from train.simulate.schema import CONTACT_EFFECTS, EFFECTS
 
 RANGES = {
     "stem_height_m": [0.3, 0.6],
+    "stem_kg": [0.005, 0.1],
     "mass_kg": [0.02, 1.0],
     "friction_static": [0.5, 1.1],
     "friction_kinetic": [0.1, 0.5],

@@ -282,6 +282,18 @@ def test_one_stem_is_met_however_far_all_stand_to_the_side():
     assert (stems.stiffness > 0.0).all()
 
 
+def test_a_stem_that_is_struck_takes_its_momentum_on_average():
+    light = {"stem_count": 1, "stem_n_m": 1e-6, "stem_damping": 0.0}
+    stem = one_object(family="foliage", stem_kg=1e-3, stem_slip_m=1.0, **light)
+    batch = run(make(stem, count=100, after_s=0.1, lead_s=[0.2, 0.3]))
+    impulse = batch.force.sum(axis=1) * 0.01
+    speed = np.diff(batch.traces["depth_m"][:, -2:])[:, 0] / 0.01
+    part = impulse / (1e-3 * speed)
+    assert "strike" in batch.trials.plan.calls
+    assert part.max() < 2.0
+    assert part.mean() == pytest.approx(1.0, abs=0.1)
+
+
 def test_stems_that_have_slipped_off_damp_no_more():
     keys = {"stem_slip_m": 0.02, "stem_spread_m": 0.02, "stem_damping": 1.0}
     batch = press(family="foliage", **keys)

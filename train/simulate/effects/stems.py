@@ -18,6 +18,7 @@ class Stems(Group):
     Attributes:
         depth, stiffness: (stems, n) metres at which each is touched, and newtons a
             metre, 0 once it has slipped off.
+        blow: (stems, n) newtons a metre with which its mass resists in this step.
         damping: (stems, n) N s/m of each, 0 once it has slipped off.
         along: (stems, n) where each stands within the face, from 0 to 1.
         taxel, part: (stems, n) the place in the window's image of the first of the two
@@ -30,6 +31,7 @@ class Stems(Group):
 
     depth: Array
     stiffness: Array
+    blow: Array
     damping: Array
     along: Array
     taxel: Places
@@ -70,6 +72,7 @@ def lay(t: Trials) -> None:
         Stems,
         depth=depth * values["stem_spread_m"],
         stiffness=stiffness,
+        blow=np.zeros(shape),
         damping=np.where(stiffness > 0.0, damping, 0.0),
         along=along,
         taxel=(low * window + (window // 2 + around)).astype(np.intp),
@@ -92,7 +95,7 @@ def let_go(t: Trials) -> None:
     stems = t.states["stems"]
     order = stems.order
     gaps = np.take_along_axis(stems.depth, order, 0)
-    stiffness = np.take_along_axis(stems.stiffness, order, 0)
+    stiffness = np.take_along_axis(stems.stiffness + stems.blow, order, 0)
     stems.slopes, stems.intercepts = bed_law(gaps, stiffness)
 
 
@@ -136,7 +139,7 @@ def image(t: Trials) -> None:
     """Put each stem's load on the two rows that it lies between."""
     stems = t.states["stems"]
     bent = np.maximum(t.contact.depth[0] - stems.depth, 0.0)
-    loads = bent * stems.stiffness
+    loads = bent * (stems.stiffness + stems.blow)
     borne = total(loads)
     loads = loads * (t.touch.force / np.where(borne > 0.0, borne, 1.0))
     rows, window, _ = t.touch.image.shape
