@@ -7,7 +7,7 @@ No stem leaps ahead of the forearm: the blow is without rebound.
 
 import numpy as np
 
-from train.simulate.effects.stems import let_go, tune
+from train.simulate.effects.stems import tune
 from train.simulate.trials import Trials
 
 
@@ -17,5 +17,4 @@ def predict(t: Trials) -> None:
     rests = (stems.depth >= t.contact.depth[0]) & (stems.stiffness > 0.0)
     blow = 2.0 * t.values["stem_kg"] / t.clock.h**2
     stems.blow = np.where(rests, blow, 0.0)
-    let_go(t)
     tune(t)
