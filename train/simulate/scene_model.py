@@ -180,8 +180,8 @@ class Scene:
         values = {"lead_s": self.lead, "taxel_n_m": self.taxel_n_m}
         if self.spread.get("travel_s"):
             values["travel_s"] = Value(self.travel_s, self.travel_s)
-        speeds = [key for key in self.spread if key.startswith(RATE_DEG_S)]
-        return {**values, **dict.fromkeys(speeds, Value(0.0, 0.0))}
+        values |= {key: Value(0.0, 0.0) for key in self.spread if RATE_DEG_S in key}
+        return values
 
     @property
     def rate_hz(self) -> float:

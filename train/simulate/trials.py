@@ -65,11 +65,7 @@ class Batch:
         stiffness = np.array(scene.stiffness)[:, None]
         damping = np.array(scene.damping)[:, None]
         self.n = len(self.specs)
-        self.sizes = {
-            "joint": len(stiffness),
-            "row": scene.skin.rows,
-            "column": columns,
-        }
+        self.sizes = {"row": scene.skin.rows, "column": columns, "joint": scene.arm.dof}
         self.sizes |= {"xyz": 3, "pair": 2, "spring": 0, "line": 1}
         self.joints = Joints(stiffness, damping)
         self.clock = self.begin(
