@@ -53,10 +53,8 @@ def test_arms_may_halt_at_different_times_once_they_push():
 def test_a_joint_may_have_another_speed_in_each_trial():
     trial_scene = scene(one_object(), spread={"rate_deg_s": [0.0, 0.0, 0.0, 8.0, 0.0]})
     rates = run(trial_scene).trials.arm.rate
+    assert np.count_nonzero(np.ptp(rates, axis=1)) == 1
     assert len(set(rates[3].tolist())) == len(rates.T)
-    still = np.arange(5) != 3
-    usual = np.array(trial_scene.rate)[still, None]
-    assert (rates[still] == usual).all()
 
 
 def test_a_recordings_metadata_are_as_the_contract_says(demo, trial):

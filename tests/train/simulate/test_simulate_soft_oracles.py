@@ -212,16 +212,6 @@ class TestBubbles:
         # Nothing bears there until it is pressed through the bubble's height.
         assert batch.traces["depth_m"][0, -1] > self.HEIGHT
 
-    def test_the_law_of_the_bed_holds_the_springs_that_are_left(self):
-        t = run(self.wrap(pop_n=0.5, width_m=0.05)).trials
-        weight = t.bed.weight[:, 0]
-        assert sorted(set(weight.tolist()))[0] == 0.0
-        intact = weight * t.bed.intact[..., 0] * t.bed.stiffness[:, :1]
-        law = [t.bed.slopes[-1, 0], t.bed.intercepts[-1, 0]]
-        gaps = t.bed.line_gap[:, 0] + t.bed.gaps[:, :1]
-        want = [intact.sum(), (intact[intact > 0.0] * gaps[intact > 0.0]).sum()]
-        assert law == pytest.approx(want, rel=1e-12)
-
 
 def test_the_stems_that_are_held_bear_by_their_own_bends():
     keys = {"stem_slip_m": 0.03, "stem_spread_m": 0.5, "stem_damping": 0.0}
