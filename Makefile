@@ -10,7 +10,7 @@ PIP := $(BIN)/$(PINNED) constraints.txt
 export OPENBLAS_NUM_THREADS := 1
 
 .PHONY: help venv test test-all test-busy lint types export demo demo-data golden study tradeoff wheel wheel-test \
-  board-test browser-test c-test kernel-test peers-test service-test hard-cases hard-cases-versions mutants fuzz kills accuracy bench transfer shear docs faults risk shifts \
+  board-test browser-test c-test kernel-test peers-test service-test hard-cases hard-cases-versions mutants fuzz kills accuracy bench transfer remount shear docs faults risk shifts \
   stopping soak measured constraints clean
 
 help:
@@ -41,6 +41,7 @@ help:
 	@echo "  make accuracy      the accuracies that export prints, of simulated and (GRASPS=folder) real sets"
 	@echo "  make bench         speed beside the alternatives"
 	@echo "  make transfer      score a model of SCENE on trials from another engine (MuJoCo)"
+	@echo "  make remount       grasps of a real hand (REMOUNT=\"folders\") after it was taken off and put on"
 	@echo "  make shear         how much sooner tasks are decided with shear (a quarter of an hour)"
 	@echo "  make faults        the cost of each fault on the skin's wires, as a table"
 	@echo "  make risk          how often certified errors, mean times and FRONT's intervals are not kept"
@@ -198,6 +199,10 @@ transfer: $(BENCHVENV)
 	$(BIN)/python -m train simulate $(SCENE) --out $(HELD)/simulated
 	$(BIN)/python -m export --data $(HELD)/simulated --out $(HELD)/household $(EXPORT)
 	$(BIN)/python -m tests.bench.transfer --model $(HELD)/household/model.onnx $(TRANSFER)
+
+# REMOUNT="icub sdh2": folders of imported grasps.
+remount: $(DEV)
+	$(BIN)/python -m tests.remount --recordings $(REMOUNT)
 
 shear: $(DEV)
 	$(BIN)/python -m tests.bench.shear --out $(OUT)/shear $(SHEAR)
