@@ -45,15 +45,21 @@ def measure(recordings):
             file = Path(out) / "model.onnx"
             export.save(file, train.fit(paths[::2], progress=False))
             model = Model(file)
-        others = list(map(load, paths[1::2]))
+        others = [*map(load, paths[1::2])]
         for remount, change in REMOUNTS.items():
             judged = answers(model, map(change, others))["object"]
             right = judged["right"]
             unusual = judged["flags"].map(lambda flags: "unusual" in flags)
-            row = {"recordings": Path(folder).name, "remount": remount}
-            row |= {"answers": len(judged), "right": right.sum()}
-            row |= {"right and unusual": (right & unusual).sum()}
-            rows.append(row | {"wrong and unusual": (~right & unusual).sum()})
+            rows.append(
+                {
+                    "recordings": Path(folder).name,
+                    "remount": remount,
+                    "answers": len(judged),
+                    "right": right.sum(),
+                    "right and unusual": (right & unusual).sum(),
+                    "wrong and unusual": (~right & unusual).sum(),
+                }
+            )
     tables.write("remount", [rows], "make remount")
 
 

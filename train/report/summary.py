@@ -154,10 +154,9 @@ def warnings(fitted: Fitted) -> list[str]:
 
 def _untouched(dataset: DataSet) -> Iterator[str]:
     """A sentence on the recordings without a contact whose labels name one."""
-    paths = []
-    for path, labels in dataset.untouched:
-        if NO_CONTACT not in labels.values():
-            paths.append(path)
+    paths = [
+        path for path, labels in dataset.untouched if NO_CONTACT not in labels.values()
+    ]
     if not paths:
         return
     line = f"no contact above {dataset.layout.onset} counts, so counted as wrong: "
@@ -195,8 +194,11 @@ def _outliers(fitted: Fitted) -> Iterator[str]:
     more = len(by_joints) - NAMED
     if more > 0:  # angles in degrees are beyond the limits in every recording
         yield f"warning: {counted(more, 'further recording')} with such joint angles"
-    names = [n for n in fitted.dataset.names if not measures.feature(n).wide]
-    names = [name for name in names if "kernels" not in name]
+    names = [
+        name
+        for name in fitted.dataset.names
+        if "kernels" not in name and not measures.feature(name).wide
+    ]
     if names:
         used = fitted.dataset.of(names)
         X = used.features(fitted.window_s, fitted.samples)

@@ -292,8 +292,7 @@ def check_energy(batch: Batch, joints: Array, times: Array) -> None:
     scene = batch.scene
     k = batch.joints.stiffness.T
     # A scene of an arm without inertia need not give one.
-    inertia = scene.inertia or (0.0,) * scene.arm.dof
-    moving = 0.5 * np.dot(inertia, batch.arm.rate**2)
+    moving = 0.5 * np.dot(scene.inertia or np.zeros(len(k.T)), batch.arm.rate**2)
     way_s = np.minimum(times[:, None], batch.arm.travel_s.T[:, None])
     targets = batch.arm.start.T[:, None] + batch.arm.rate.T[:, None] * way_s
     torque = k * (targets - joints)

@@ -125,8 +125,8 @@ def _spread(table: SceneTable, dof: int) -> dict[str, float]:
     """{value: its deviation}."""
     key = schema.RATE_DEG_S
     speeds = table.numbers(key, dof, (0.0,) * dof, low=0.0, high=720.0)
-    out = table.fields(schema.SPREAD)
-    return out | {f"{key}.{i}": speed for i, speed in enumerate(speeds) if speed}
+    by_joint = {f"{key}.{i}": speed for i, speed in enumerate(speeds) if speed}
+    return table.fields(schema.SPREAD) | by_joint
 
 
 def _check_places(scene: Scene, where: str) -> None:

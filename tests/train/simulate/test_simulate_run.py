@@ -51,8 +51,8 @@ def test_arms_may_halt_at_different_times_once_they_push():
 
 
 def test_a_joint_may_have_another_speed_in_each_trial():
-    trial_scene = scene(one_object(), spread={"rate_deg_s": [0.0, 0.0, 0.0, 8.0, 0.0]})
-    rates = run(trial_scene).trials.arm.rate
+    spread = {"rate_deg_s": [0.0, 0.0, 0.0, 8.0, 0.0]}
+    rates = run(scene(one_object(), spread=spread)).trials.arm.rate
     assert np.count_nonzero(np.ptp(rates, axis=1)) == 1
     assert len(set(rates[3].tolist())) == len(rates.T)
 

@@ -280,7 +280,6 @@ def test_a_stem_that_is_struck_takes_its_momentum_on_average():
     speed = np.diff(batch.traces["depth_m"][:, -2:])[:, 0] / 0.01
     part = impulse / (1e-3 * speed)
     assert "strike" in batch.trials.plan.calls
-    assert part.max() < 2.0
     assert part.mean() == pytest.approx(1.0, abs=0.1)
 
 
