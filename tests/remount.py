@@ -42,7 +42,7 @@ def measure(recordings):
     for folder in recordings:
         paths = find([folder])
         with tempfile.TemporaryDirectory() as out:
-            file = Path(out) / "model.onnx"
+            file = f"{out}/model.onnx"
             export.save(file, train.fit(paths[::2], progress=False))
             model = Model(file)
         others = [*map(load, paths[1::2])]
