@@ -10,8 +10,8 @@ PIP := $(BIN)/$(PINNED) constraints.txt
 export OPENBLAS_NUM_THREADS := 1
 
 .PHONY: help venv test test-all test-busy lint types export demo demo-data golden study tradeoff wheel wheel-test \
-  board-test browser-test c-test kernel-test peers-test service-test hard-cases hard-cases-versions mutants fuzz kills accuracy bench transfer remount shear docs faults risk shifts \
-  stopping soak measured constraints clean
+  board-test browser-test c-test kernel-test peers-test service-test hard-cases hard-cases-versions mutants fuzz kills accuracy bench transfer shear docs faults risk shifts \
+  stopping remount soak measured constraints clean
 
 help:
 	@echo "Everyday"
@@ -41,11 +41,11 @@ help:
 	@echo "  make accuracy      the accuracies that export prints, of simulated and (GRASPS=folder) real sets"
 	@echo "  make bench         speed beside the alternatives"
 	@echo "  make transfer      score a model of SCENE on trials from another engine (MuJoCo)"
-	@echo "  make remount       grasps of a real hand (REMOUNT=\"folders\") after it was taken off and put on"
 	@echo "  make shear         how much sooner tasks are decided with shear (a quarter of an hour)"
 	@echo "  make faults        the cost of each fault on the skin's wires, as a table"
 	@echo "  make risk          how often certified errors, mean times and FRONT's intervals are not kept"
 	@echo "  make shifts        what touches unlike the training do to answers, and whether doubt tells it"
+	@echo "  make remount       grasps of a real hand (REMOUNT=\"folders\") after it was taken off and put on"
 	@echo "  make stopping      deciding when sure beside fixed windows and extra trees"
 	@echo "  make soak          ten minutes of the loop in virtual time, and load on its page"
 	@echo "  make measured      all tables of docs/measured anew, one after another; ONLY=\"risk kills\""
@@ -200,10 +200,6 @@ transfer: $(BENCHVENV)
 	$(BIN)/python -m export --data $(HELD)/simulated --out $(HELD)/household $(EXPORT)
 	$(BIN)/python -m tests.bench.transfer --model $(HELD)/household/model.onnx $(TRANSFER)
 
-# REMOUNT="icub sdh2": folders of imported grasps.
-remount: $(DEV)
-	$(BIN)/python -m tests.remount --recordings $(REMOUNT)
-
 shear: $(DEV)
 	$(BIN)/python -m tests.bench.shear --out $(OUT)/shear $(SHEAR)
 
@@ -271,6 +267,10 @@ peers-test: $(PEERS)/.ready
 
 stopping: $(DEV)
 	$(BIN)/python -m tests.bench.stopping --data $(STOPPED) $(STOPPING)
+
+# REMOUNT="icub sdh2": folders of imported grasps.
+remount: $(DEV)
+	$(BIN)/python -m tests.remount --recordings $(REMOUNT)
 
 # FAULTS="--every 10": every tenth position.
 faults: $(DEV)
