@@ -11,7 +11,7 @@ export OPENBLAS_NUM_THREADS := 1
 
 .PHONY: help venv test test-all test-busy lint types export demo demo-data golden study tradeoff wheel wheel-test \
   board-test browser-test c-test kernel-test peers-test service-test hard-cases hard-cases-versions mutants fuzz kills accuracy bench transfer shear docs faults risk shifts \
-  stopping remount soak measured constraints clean
+  stopping soak measured constraints clean
 
 help:
 	@echo "Everyday"
@@ -268,6 +268,7 @@ peers-test: $(PEERS)/.ready
 stopping: $(DEV)
 	$(BIN)/python -m tests.bench.stopping --data $(STOPPED) $(STOPPING)
 
+.PHONY: remount
 # REMOUNT="icub sdh2": folders of imported grasps.
 remount: $(DEV)
 	$(BIN)/python -m tests.remount --recordings $(REMOUNT)
