@@ -45,6 +45,7 @@ help:
 	@echo "  make faults        the cost of each fault on the skin's wires, as a table"
 	@echo "  make risk          how often certified errors, mean times and FRONT's intervals are not kept"
 	@echo "  make shifts        what touches unlike the training do to answers, and whether doubt tells it"
+	@echo "  make remount       grasps of a real hand (REMOUNT=\"folders\") after it was taken off and put on"
 	@echo "  make stopping      deciding when sure beside fixed windows and extra trees"
 	@echo "  make soak          ten minutes of the loop in virtual time, and load on its page"
 	@echo "  make measured      all tables of docs/measured anew, one after another; ONLY=\"risk kills\""
@@ -266,6 +267,11 @@ peers-test: $(PEERS)/.ready
 
 stopping: $(DEV)
 	$(BIN)/python -m tests.bench.stopping --data $(STOPPED) $(STOPPING)
+
+.PHONY: remount
+# REMOUNT="icub sdh2": folders of imported grasps.
+remount: $(DEV)
+	$(BIN)/python -m tests.remount --recordings $(REMOUNT)
 
 # FAULTS="--every 10": every tenth position.
 faults: $(DEV)

@@ -17,7 +17,7 @@ import pandas as pd
 from joblib import cpu_count
 
 from edge.model.model import Model
-from edge.tools.replay import Summary, decide
+from edge.tools.replay import decide
 from tests.bench import tables
 from tests.bench.mujoco_touch import (
     ONSET_COUNTS,
@@ -32,6 +32,8 @@ from train.report.work import Workers
 from train.simulate import streams
 
 TASKS = ("category", "mobility", "softness")
+UNSURE = 0.8
+"""A confidence below it."""
 HABITS = {
     "as in the paper": {},
     "arm speed x 0.5": {"speed": 0.5},
@@ -117,36 +119,40 @@ def touch_object(index, seed, habit):
         attempt += 1
 
 
-def touches(seed, trials):
-    """The number, the habit and a recording of each touch, two of each object; of half
-    as many objects as trials, but at least one."""
-    habits = islice(cycle(HABITS), max(trials // 2, 1))
+def touches(seed):
+    """The habit and a recording of each of 120 touches, two of each object."""
+    habits = islice(cycle(HABITS), 60)
     cases = [(number, seed, habit) for number, habit in enumerate(habits)]
     pairs = Workers(cpu_count()).map("objects in MuJoCo", touch_object, cases)
-    for (number, _, habit), pair in zip(cases, pairs, strict=True):
+    for (*_, habit), pair in zip(cases, pairs, strict=True):
         for recording in pair:
-            yield number, habit, recording
+            yield habit, recording
 
 
 def judge(model, touch):
     """A row: whether a model decides the tasks of a touch rightly, and how many of its
-    right and of its wrong answers are called unusual.
+    right and of its wrong answers are called unusual, or unsure.
 
     A contact without a decision counts as wrong.
     """
-    number, habit, recording = touch
-    events = decide(model, recording, f"touch {number}")
-    summary = Summary(dict.fromkeys(TASKS))
-    summary.add(recording.labels, events)
-    row = {"trials": habit, "kind": recording.labels["object"]}
-    row |= {f"{task} right": summary.right(task)[0] for task in TASKS}
-    row |= {"right and unusual": 0, "wrong and unusual": 0}
-    for event in events:
-        if (task := event.get("task")) in TASKS:
-            right = event["label"] == recording.labels[task]
-            column = f"{'right' if right else 'wrong'} and unusual"
-            row[column] += "unusual" in event.get("flags", ())
-    return row | {"number": 1}
+    habit, recording = touch
+    row = {"trials": habit, "kind": recording.labels["object"], "number": 1}
+    row |= {f"{task} right": 0 for task in TASKS}
+    row |= {
+        f"{word} and {doubt}": 0
+        for word in ("right", "wrong")
+        for doubt in ("unusual", "unsure")
+    }
+    events = decide(model, recording, habit)
+    first = {event.get("task"): event for event in reversed(events)}
+    for task in first.keys() & TASKS:
+        event = first[task]
+        right = event["label"] == recording.labels[task]
+        word = "right" if right else "wrong"
+        row[f"{task} right"] += right
+        row[f"{word} and unusual"] += "unusual" in event.get("flags", ())
+        row[f"{word} and unsure"] += (event["confidence"] or 0.0) < UNSURE
+    return row
 
 
 def summed(rows, column):
@@ -155,10 +161,10 @@ def summed(rows, column):
     return groups.sum(numeric_only=True).reset_index().to_dict("records")
 
 
-def measure(model, trials, seed):
+def measure(model, seed):
     """Make the trials, let the model decide, and write the tables."""
     loaded = Model(model)
-    rows = pd.DataFrame([judge(loaded, touch) for touch in touches(seed, trials)])
+    rows = pd.DataFrame([judge(loaded, touch) for touch in touches(seed)])
     whole = summed(rows.assign(trials="all"), "trials")
     by_habit = [*summed(rows, "trials"), *whole]
     tables.write("transfer", [by_habit, summed(rows, "kind")])
@@ -169,6 +175,5 @@ if __name__ == "__main__":
         measure,
         __doc__,
         ("--model", Path, "model.onnx"),
-        ("--trials", 120, "two of each object"),
         ("--seed", 1, "of the trials"),
     )

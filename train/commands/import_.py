@@ -16,8 +16,6 @@ from dataclasses import replace
 from importlib import import_module
 from pathlib import Path
 
-import numpy as np
-
 from edge.errors import InputError, printable
 from edge.recording import Recording
 from edge.saving import save
@@ -30,7 +28,6 @@ from train.importers import Refused, Trial, names
 from train.progress import bar, say
 
 LOG = logging.getLogger(__name__)
-ZERO_FRAMES = 3
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
@@ -52,12 +49,6 @@ def add_options(parser: argparse.ArgumentParser) -> None:
             help="folder for the recordings",
         )
         add_arm(command, "to select and order a log's joint angles by name")
-        command.add_argument(
-            "--zero",
-            action="store_true",
-            help="subtract each taxel's value in the first three frames, for a sensor whose offset "
-            "drifts between trials; nothing may touch the skin in them",
-        )
         if hasattr(module, "add_options"):
             module.add_options(command)
         command.set_defaults(importer=module)
@@ -130,7 +121,6 @@ def write(
             skipped.append(str(error))
             continue
         paths.add(path)
-        recording = zeroed(recording) if arguments.zero else recording
         if "threshold_counts" in recording.meta["skin"]:
             save(path, recording)
         else:
@@ -191,10 +181,3 @@ def set_thresholds(trials: Sequence[tuple[Path, Recording]]) -> str:
         f"{proposal.source}: {touched} of {len(trials)} have a contact; "
         "`python -m train thresholds` compares other thresholds"
     )
-
-
-def zeroed(recording: Recording) -> Recording:
-    """The recording minus each taxel's median over the first three frames, and at least
-    0."""
-    offset = np.median(recording.frames[:ZERO_FRAMES], axis=0).astype(np.uint16)
-    return replace(recording, frames=np.maximum(recording.frames, offset) - offset)

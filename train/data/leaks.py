@@ -81,7 +81,6 @@ def leaks(dataset: DataSet, y: Labels) -> list[str]:
             notes.append(
                 f"warning: the first frame alone tells {task} in {share:.0%} of the "
                 "trials, before anything is touched. The accuracy holds only where "
-                "this is so in use too; `python -m train import --zero` subtracts the "
-                "first frames"
+                "this is so in use too"
             )
     return notes

@@ -60,6 +60,8 @@ LEAST_SHARE = 0.02
 MOVED_SHARE = 0.05
 """Least standard deviation of a joint's column that may tell of a changed body, where a
 scene drew the trained things, as a share of its feature's largest."""
+REMOUNT_RAD = math.radians(2.0)
+"""By so much a joint's zero lies off once an arm was taken off and put on again."""
 CLIP = 6.0
 """Standard deviations at which a column is cut off."""
 STEP_BITS = 12
@@ -137,7 +139,7 @@ class NoveltySpace:
         X: Floats,
         labels: Strings,
         widths: Sequence[int],
-        telling: Booleans | None = None,
+        least: Floats | float = 0.0,
     ) -> NoveltySpace:
         """The space of some trials.
 
@@ -145,14 +147,12 @@ class NoveltySpace:
             X: (decision points, n, p) their vectors.
             labels: (n,) whose trials are alike.
             widths: columns of each feature type.
-            telling: (p,) whether columns count; all do where None.
+            least: (p,) of `least_deviations`.
         """
-        if telling is None:
-            telling = np.ones(X.shape[-1], dtype=np.bool_)
-        scales = [_scale(x, widths, telling) for x in X]
+        scales = [_scale(x, widths, least) for x in X]
         steps = [_steps(x, *scale) for x, scale in zip(X, scales, strict=True)]
         trials = X.shape[1]
-        columns = int(telling.sum())
+        columns = X.shape[-1] - int(np.isinf(least).sum())
         # Half of the columns, so that something can lie outside the components.
         most = min(MOST_COMPONENTS, trials // TRIALS_A_COMPONENT, columns // 2)
         axes = _axes(np.concatenate(steps), max(most, 1))
@@ -187,27 +187,32 @@ def _nearest(y: Floats, rows: Floats, nearness: Floats) -> Floats:
     return np.asarray(np.sqrt(squares.min(axis=1)))
 
 
-def telling_columns(vectors: Vectors) -> Booleans:
-    """(p,) whether columns may tell of a changed body, where a scene drew the things of
-    the vectors (decision points, n, p).
+def least_deviations(vectors: Vectors, drawn: bool) -> Floats:
+    """(p,) the least standard deviations of the columns of vectors (decision points, n,
+    p); infinite of those that tell of no changed body.
 
-    A model of such things is for arms of which a scene knows only the outlines. So a
-    joint counts if it moves in the scene, by how far it has moved in the end: its
-    simulated course is smooth, and follows from the others to a thousandth of a radian.
+    Joints' angles lie off by `REMOUNT_RAD` once the arm was taken off and put on again.
+    A model of things that a scene drew is for arms of which it knows only the outlines.
+    So there a joint counts if it moves in the scene, by how far it has moved in the end:
+    its simulated course is smooth, and follows from the others to a thousandth of a
+    radian.
     """
-    telling = np.ones(vectors.X.shape[-1], dtype=np.bool_)
+    least = np.zeros(vectors.X.shape[-1])
     for name in vectors.features:
         of_feature = feature(name)
-        if of_feature.of_joints:
-            columns = vectors.columns_of([name])
+        columns = vectors.columns_of([name])
+        if drawn and of_feature.of_joints:
             deviation = vectors.X[-1][:, columns].std(axis=0)
             ends = np.arange(1, len(columns) + 1) % max(of_feature.samples, 1) == 0
-            telling[columns] = ends & (deviation >= MOVED_SHARE * deviation.max())
-    return telling
+            moves = ends & (deviation >= MOVED_SHARE * deviation.max())
+            least[columns] = np.where(moves, 0.0, np.inf)
+        elif of_feature.quantity == "joint_angle":
+            least[columns] = REMOUNT_RAD
+    return least
 
 
 def _scale(
-    x: Floats, widths: Sequence[int], telling: Booleans
+    x: Floats, widths: Sequence[int], least: Floats | float
 ) -> tuple[Floats, Floats]:
     """Mean (p,) of each column of x (n, p), and its steps a unit (p,): 0 of those that
     do not count."""
@@ -217,9 +222,9 @@ def _scale(
     starts = np.cumsum(columns) - columns
     squares = np.add.reduceat(deviation**2, starts) / columns
     smallest = LEAST_SHARE * np.repeat(np.sqrt(squares), columns)
-    deviation = np.maximum(deviation, smallest)
+    deviation = np.maximum(np.maximum(deviation, smallest), least)
     # The spread of a constant column is the rounding of its mean.
-    moves = telling & (deviation > 1e-9 * np.abs(mean))
+    moves = deviation > 1e-9 * np.abs(mean)
     gain = np.divide(2.0**STEP_BITS, deviation, out=np.zeros_like(mean), where=moves)
     return mean, _in_float32(gain)
 
@@ -322,7 +327,7 @@ def held_out_scores(
     folds: Integers,
     widths: Sequence[int],
     jobs: int = 1,
-    telling: Booleans | None = None,
+    least: Floats | float = 0.0,
 ) -> Scores:
     """The scores of trials (n,) by spaces without their fold.
 
@@ -332,11 +337,11 @@ def held_out_scores(
         folds: (n,) from 0; -1 for trials that are never left out, whose score is NaN.
         widths: columns of each feature type.
         jobs: processes.
-        telling: (p,) whether columns count; all do where None.
+        least: (p,) of `least_deviations`.
     """
     count = int(folds.max()) + 1
     work = [
-        delayed(_fold_scores)(X, labels, folds == k, widths, telling)
+        delayed(_fold_scores)(X, labels, folds == k, widths, least)
         for k in range(count)
     ]
     scores = np.full((2, *X.shape[:2]), np.nan)
@@ -350,10 +355,10 @@ def _fold_scores(
     labels: Strings,
     left_out: Booleans,
     widths: Sequence[int],
-    telling: Booleans | None,
+    least: Floats | float,
 ) -> Scores:
     with single_thread():
-        space = NoveltySpace.of(X[:, ~left_out], labels[~left_out], widths, telling)
+        space = NoveltySpace.of(X[:, ~left_out], labels[~left_out], widths, least)
         return space.scores(X[:, left_out])
 
 

@@ -63,8 +63,8 @@ from train.model.novelty import (
     Scores,
     beyond,
     held_out_scores,
+    least_deviations,
     limits_of,
-    telling_columns,
 )
 from train.model.pipeline import Choices, ContactClassifier
 from train.model.rules import RISK, Course, agreeing, candidates, certify
@@ -231,14 +231,14 @@ class SequentialClassifier:
         names = self.choices.keys() - kinds or self.choices.keys()
         self._name = finest({task: vectors.y[task] for task in names})
         labels = vectors.y[self._name]
-        telling = telling_columns(vectors) if self.drawn else None
+        least = least_deviations(vectors, self.drawn)
         with single_thread():
-            self.space_ = NoveltySpace.of(vectors.X, labels, vectors.columns, telling)
+            self.space_ = NoveltySpace.of(vectors.X, labels, vectors.columns, least)
         novelty_folds = np.where(folds >= 0, stratified_folds(labels, FOLDS), -1)
 
         def scores_without(folds: Integers) -> Scores:
             return held_out_scores(
-                vectors.X, labels, folds, vectors.columns, self.jobs, telling
+                vectors.X, labels, folds, vectors.columns, self.jobs, least
             )
 
         scores = scores_without(novelty_folds)

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 from sklearn.neighbors import NearestNeighbors
 
-from edge.arrays import Floats, Integers
+from edge.arrays import Floats
 from edge.errors import printable
 from edge.tools.info import doubt
 from edge.touch import measures
@@ -21,7 +21,7 @@ from train.data.groups import TRIAL
 from train.data.labels import NO_CONTACT
 from train.fitting import Fitted
 from train.model.pipeline import Choice, squared_distances
-from train.model.projection import CLOSE_EIGENVALUES, FEWEST_UNITS
+from train.model.projection import FEWEST_UNITS
 from train.report.score import interval
 from train.report.section import Row, Table, counted
 
@@ -154,10 +154,9 @@ def warnings(fitted: Fitted) -> list[str]:
 
 def _untouched(dataset: DataSet) -> Iterator[str]:
     """A sentence on the recordings without a contact whose labels name one."""
-    paths = []
-    for path, labels in dataset.untouched:
-        if NO_CONTACT not in labels.values():
-            paths.append(path)
+    paths = [
+        path for path, labels in dataset.untouched if NO_CONTACT not in labels.values()
+    ]
     if not paths:
         return
     line = f"no contact above {dataset.layout.onset} counts, so counted as wrong: "
@@ -195,8 +194,11 @@ def _outliers(fitted: Fitted) -> Iterator[str]:
     more = len(by_joints) - NAMED
     if more > 0:  # angles in degrees are beyond the limits in every recording
         yield f"warning: {counted(more, 'further recording')} with such joint angles"
-    names = [n for n in fitted.dataset.names if not measures.feature(n).wide]
-    names = [name for name in names if "kernels" not in name]
+    names = [
+        name
+        for name in fitted.dataset.names
+        if "kernels" not in name and not measures.feature(name).wide
+    ]
     if names:
         used = fitted.dataset.of(names)
         X = used.features(fitted.window_s, fitted.samples)
@@ -221,26 +223,7 @@ def _task_warnings(fitted: Fitted, task: str) -> Iterator[str]:
             f"warning: {task}: the trials span {components} components, "
             f"{choice.components - components} fewer than asked for"
         )
-    yield from _geometry(fitted, task)
-    gap = fitted_task.space.projection.gap_
-    if gap < CLOSE_EIGENVALUES:
-        yield (
-            f"warning: {task}: two components explain the same variance to within "
-            f"{gap:.1e}; which of them is kept is arbitrary"
-        )
-
-
-def _geometry(fitted: Fitted, task: str) -> Iterator[str]:
-    """Sentences on trials that lie at the same place, or far outside."""
-    fitted_task = fitted.classifier.tasks_[task]
     rows = fitted_task.rows
-    equal = tied_across_labels(rows, fitted_task.labels)
-    if equal:
-        yield (
-            f"warning: {task}: {equal} trials have the same coordinates as a trial "
-            "with another label; the earlier trial counts as nearer, so their order "
-            "decides the label"
-        )
     members = fitted_task.space.members
     _, different = np.unique(fitted.X[members], axis=0, return_index=True)
     steps = coarseness(rows[different], fitted_task.unit)
@@ -252,14 +235,6 @@ def _geometry(fitted: Fitted, task: str) -> Iterator[str]:
             f"{fitted.dataset.trials[farthest].path} lies far outside all others; "
             "leave it out if the recording is wrong"
         )
-
-
-def tied_across_labels(rows: Floats, labels: Integers) -> int:
-    """The number of rows (n, c) that equal a row with another label (n,)."""
-    _, group = np.unique(rows, axis=0, return_inverse=True)
-    labels_of = np.zeros((len(rows), int(labels.max()) + 1), dtype=bool)
-    labels_of[group.ravel(), labels] = True
-    return int((labels_of.sum(axis=1) > 1)[group.ravel()].sum())
 
 
 def coarseness(rows: Floats, unit: float) -> float:

@@ -291,11 +291,10 @@ def check_energy(batch: Batch, joints: Array, times: Array) -> None:
     """
     scene = batch.scene
     k = batch.joints.stiffness.T
-    moving = 0.5 * sum(
-        i * r * r for i, r in zip(scene.inertia, scene.rate, strict=False)
-    )
+    # A scene of an arm without inertia need not give one.
+    moving = 0.5 * np.dot(scene.inertia or np.zeros(len(k.T)), batch.arm.rate**2)
     way_s = np.minimum(times[:, None], batch.arm.travel_s.T[:, None])
-    targets = batch.arm.start.T[:, None] + batch.joints.rate.T * way_s
+    targets = batch.arm.start.T[:, None] + batch.arm.rate.T[:, None] * way_s
     torque = k * (targets - joints)
     stored = (0.5 * torque * (targets - joints)).sum(axis=2)
     put_in = (0.5 * (torque[:, 1:] + torque[:, :-1]) * np.diff(targets, axis=1)).sum(
@@ -309,7 +308,7 @@ def check_energy(batch: Batch, joints: Array, times: Array) -> None:
         for energy in (put_in, np.abs(put_in), turned.sum(axis=2))
     )
     held = stored + lost
-    brought = stored[:, :1] + moving + work
+    brought = stored[:, :1] + moving[:, None] + work
     gains = ~(held <= brought + ENERGY_MADE * both_ways + 1e-9)
     if gains.any():
         i = int(np.argmax(gains.any(axis=1)))

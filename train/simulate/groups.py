@@ -81,14 +81,11 @@ class Joints:
     """The arm's joints, the same in all trials, (dof, 1) each.
 
     Attributes:
-        stiffness, damping, rate: of each joint, and its equilibrium point's speed.
-        lag: radians by which it trails its equilibrium point in free motion.
+        stiffness, damping: of each joint.
     """
 
     stiffness: Array
     damping: Array
-    rate: Array
-    lag: Array
 
 
 class Arm(Group):
@@ -97,6 +94,8 @@ class Arm(Group):
     Attributes:
         start, travel_s: (dof, n) the equilibrium point's angles at t = 0, and for how
             long it moves.
+        rate, lag: (dof, n) the equilibrium point's speed, and radians by which the
+            joint trails it in free motion.
         q, q_free, q_frame: (dof, n) joint angles: now, after the step without load, at
             the frame.
         step_stiffness, step_compliance: (dof, n) stiffness of a joint's damping and
@@ -108,6 +107,8 @@ class Arm(Group):
 
     start: PerJoint
     travel_s: PerJoint
+    rate: PerJoint
+    lag: PerJoint
     q: PerJoint
     q_free: PerJoint
     q_frame: PerJoint

@@ -89,7 +89,7 @@ def from_dict(table: Mapping[str, Any], where: str = "scene") -> Scene:
     per_trial = trials.fields(schema.TRIALS)
     arm = _arm(top.table("arm", {}))
     skin, taxel = _skin(top.table("skin", {}))
-    spread = top.table("spread", {}).fields(schema.SPREAD)
+    spread = _spread(top.table("spread", {}), arm["arm"].dof)
     labels = top.table("labels", {}).fields(schema.LABELS)
     steps = top.table("step_s", {})
     scene = Scene(
@@ -119,6 +119,14 @@ def from_dict(table: Mapping[str, Any], where: str = "scene") -> Scene:
         )
     check_supported(scene, where)
     return scene
+
+
+def _spread(table: SceneTable, dof: int) -> dict[str, float]:
+    """{value: its deviation}."""
+    key = schema.RATE_DEG_S
+    speeds = table.numbers(key, dof, (0.0,) * dof, low=0.0, high=720.0)
+    by_joint = {f"{key}.{i}": speed for i, speed in enumerate(speeds) if speed}
+    return table.fields(schema.SPREAD) | by_joint
 
 
 def _check_places(scene: Scene, where: str) -> None:

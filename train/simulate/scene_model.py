@@ -12,7 +12,7 @@ from edge.config import ConfigTable
 from edge.touch.arm import Chain
 from edge.touch.layout import SkinLayout
 from train.simulate.arm import Array, Kinematics
-from train.simulate.schema import EFFECTS, Field
+from train.simulate.schema import EFFECTS, RATE_DEG_S, Field
 
 
 @dataclass(frozen=True)
@@ -180,6 +180,7 @@ class Scene:
         values = {"lead_s": self.lead, "taxel_n_m": self.taxel_n_m}
         if self.spread.get("travel_s"):
             values["travel_s"] = Value(self.travel_s, self.travel_s)
+        values |= {key: Value(0.0, 0.0) for key in self.spread if RATE_DEG_S in key}
         return values
 
     @property

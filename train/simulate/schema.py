@@ -77,6 +77,8 @@ SPREAD = {
     "cover": Field(0.0, 1.0, 0.0),  # of the skin's and the cover's stiffness, as a part
     "travel_s": Field(0.0, 10.0, 0.0),  # time at which the arm halts
 }
+RATE_DEG_S = "rate_deg_s"
+"""A spread of a number a joint, of its speed: `rate_deg_s.3` is the fourth joint's."""
 SPREAD_OF_MOVABLE = {"slope_deg": "mass_kg", "aside_m": "foot_m"}
 """{spread around 0: the other key that a movable object needs for it}; the object need
 not give a value for the spread itself."""
@@ -172,6 +174,7 @@ CONTACT_EFFECTS = {
     "pop": Effect(families=("bubbles",)),
     "stems": Effect(families=("foliage",)),
     "upright": Effect(needs=("stems",), keys=("stem_height_m",)),
+    "strike": Effect(needs=("stems",), keys=("stem_kg",)),
     "tilt": Effect(families=("rigid", "foam", "pillow", "bubbles")),
     "relaxation": Effect(families=ELASTIC),
     # loss_s: dashpot by stiffness

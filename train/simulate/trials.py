@@ -64,11 +64,10 @@ class Batch:
         h = 1.0 / (scene.rate_hz * np.array(usual))
         stiffness = np.array(scene.stiffness)[:, None]
         damping = np.array(scene.damping)[:, None]
-        rate = np.array(scene.rate)[:, None]
         self.n = len(self.specs)
-        self.sizes = {"joint": len(rate), "row": scene.skin.rows, "column": columns}
+        self.sizes = {"row": scene.skin.rows, "column": columns, "joint": scene.arm.dof}
         self.sizes |= {"xyz": 3, "pair": 2, "spring": 0, "line": 1}
-        self.joints = Joints(stiffness, damping, rate, damping / stiffness * rate)
+        self.joints = Joints(stiffness, damping)
         self.clock = self.begin(
             Clock,
             usual=usual,
@@ -214,7 +213,7 @@ class Trials:
 
     def equilibrium(self, t: Any) -> Array:
         """(dof, m) equilibrium angles at times (m,)."""
-        way = self.joints.rate * np.minimum(t, self.arm.travel_s)
+        way = self.arm.rate * np.minimum(t, self.arm.travel_s)
         return np.asarray(self.arm.start + way)
 
     def add_springs(

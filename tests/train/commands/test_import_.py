@@ -1,6 +1,4 @@
-"""Offsets taken away, and thresholds from the noise, of imported recordings."""
-
-from dataclasses import replace
+"""Thresholds from the noise, of imported recordings."""
 
 import numpy as np
 
@@ -8,22 +6,6 @@ from edge.recording import load
 from tests.edge.test_writing import left_by_a_dead_run
 from tests.train.importers.test_csv import write_frames
 from train.__main__ import main
-from train.commands.import_ import zeroed
-
-
-def test_a_constant_offset_is_subtracted_and_nothing_goes_below_zero(make_touch):
-    trial = make_touch(arm=False)
-    offset = (
-        np.random.default_rng(0)
-        .integers(0, 300, trial.frames.shape[1:])
-        .astype(np.uint16)
-    )
-    shifted = replace(trial, frames=trial.frames + offset)
-    shifted.frames[-1] = 0
-    back = zeroed(shifted)
-    assert (back.frames[:-1] == trial.frames[:-1]).all()
-    assert not back.frames[-1].any()
-    assert back.frames.dtype == np.uint16
 
 
 def test_a_name_too_long_to_be_looked_up_is_one_sentence(tmp_path, refusal):

@@ -16,8 +16,8 @@ from train.model.novelty import (
     STEP_BITS,
     NoveltySpace,
     held_out_scores,
+    least_deviations,
     limits_of,
-    telling_columns,
 )
 
 WIDTHS = (20, 10)
@@ -143,15 +143,24 @@ def test_of_a_drawn_scene_joints_count_by_how_far_those_that_move_have_moved():
     courses = ways[..., None] * np.linspace(0.1, 1.0, 10)
     X = np.concatenate([rng.normal(size=(1, 40, 5)), courses.reshape(1, 40, 30)], -1)
     names = ("log_max_force@5", "joint_change@10")
-    telling = telling_columns(Vectors(X, {}, names, (5, 30)))
-    assert np.flatnonzero(telling).tolist() == [0, 1, 2, 3, 4, 14, 24]
+    least = least_deviations(Vectors(X, {}, names, (5, 30)), drawn=True)
+    assert np.flatnonzero(least == 0.0).tolist() == [0, 1, 2, 3, 4, 14, 24]
     labels = np.array(list("ab"))[np.arange(40) % 2]
-    space = NoveltySpace.of(X, labels, (5, 30), telling)
+    space = NoveltySpace.of(X, labels, (5, 30), least)
     moved = X.copy()
     moved[..., 25:] += 1.0
     assert space.scores(moved).novelty.tolist() == space.scores(X).novelty.tolist()
     moved[..., 14] += 5.0
     assert (space.scores(moved).novelty > space.scores(X).novelty).mean() > 0.9
+
+
+def test_an_angle_may_lie_off_by_a_remount():
+    vectors = Vectors(
+        np.zeros((1, 2, 30)), {}, ("contact_motion@20", "joint_angle@10"), WIDTHS
+    )
+    least = least_deviations(vectors, drawn=False)
+    assert not least[:20].any()
+    assert set(least[20:]) == {math.radians(2.0)}
 
 
 def test_held_out_scores_do_not_depend_on_the_held_out_trials():

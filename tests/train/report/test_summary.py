@@ -1,6 +1,5 @@
 """The sentences that go with a model."""
 
-import shutil
 from dataclasses import replace
 
 import numpy as np
@@ -15,7 +14,6 @@ from train.report.summary import (
     coarseness,
     posture_accuracy,
     summary,
-    tied_across_labels,
     warnings,
 )
 
@@ -89,19 +87,6 @@ def test_joint_angles_common_to_objects_are_no_leak(recordings, tmp_path):
     assert warnings_with(fitted, "warning: object: the joint angles") == []
 
 
-def test_equal_trials_of_different_labels_are_counted(recordings, tmp_path):
-    """One touch stored under three names, twice with its own label, of which one is left
-    out, and once with another."""
-    shutil.copytree(recordings, tmp_path, dirs_exist_ok=True)
-    touch = load(recordings / "soft_7.npz")
-    save(tmp_path / "again.npz", touch)
-    labels = {**touch.labels, "object": "another"}
-    save(tmp_path / "other.npz", replace(touch, meta={**touch.meta, "labels": labels}))
-    fitted = train.fit(str(tmp_path), features=["paper"], projection="pca", jobs=1, k=1)
-    (sentence,) = warnings_with(fitted, "have the same coordinates")
-    assert sentence.startswith("warning: object: 2 trials have")
-
-
 def test_a_task_of_one_label_has_no_trial_far_outside(recordings, tmp_path):
     def label(_, recording):
         labels = {**recording.labels, "place": "here"}
@@ -145,11 +130,6 @@ def test_a_trial_so_far_outside_that_the_others_hardly_differ_is_named(
 )
 def test_coarseness_is_the_median_gap_of_neighbours_in_units(rows, steps):
     assert coarseness(0.5 * np.array(rows), 0.5) == steps
-
-
-def test_rows_that_are_equal_but_for_rounding_are_not_equal():
-    rows = np.array([[0.0], [1.0], [0.0], [1.0 + 1e-15], [2.0], [2.0]])
-    assert tied_across_labels(rows, np.array([0, 1, 1, 0, 1, 1])) == 2
 
 
 def test_angles_in_degrees_name_some_recordings_and_count_the_others(fitted):

@@ -108,10 +108,9 @@ class Rig:
         specs = (TrialSpec(scene.objects[0], "fixed", 0),) * n
         self.trials = t = Batch(scene, specs, values, plan_of((effects,) * n))
         t.clock.h = h
-        t.joints.rate = np.zeros((5, 1))
         t.joints.stiffness = np.ones((5, 1))
         t.joints.damping = np.zeros((5, 1))
-        t.joints.rate[0] = speed
+        t.arm.rate[0] = speed
         t.joints.stiffness[0] = arm_k
         t.joints.damping[0] = arm_d
         t.arm.travel_s[0] = travel_s

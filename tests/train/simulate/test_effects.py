@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tests.train.simulate.scenes import Rig, make, one_object, run
+from tests.train.simulate.scenes import Rig
 from train.simulate import effects, schema
 
 TEXT = (Path(__file__).parents[3] / "CONTRIBUTING.md").read_text()
@@ -39,17 +39,3 @@ def test_a_sponge_under_a_steady_push_creeps_as_its_law_says():
     trace = Rig(5e-4, effects=("sponge",), speed=speed, sponge_n_s_m=eta).run(2000)
     want = eta * speed * (1.0 - np.exp(-stiffness * trace.t / eta))
     np.testing.assert_allclose(trace.force, want, atol=2e-3 * want.max())
-
-
-@pytest.mark.usefixtures("sponge")
-def test_an_object_calls_for_it_by_its_key():
-    soft = one_object(sponge_n_s_m=50.0)[0]
-    hard = {**one_object()[0], "name": "other"}
-    batch = run(make([soft, hard]))
-    alone = run(make([hard]))
-    crept = batch.trials.states["sponge"].crept
-    assert (crept[:2] > 0.01).all()
-    assert (crept[2:] == 0.0).all()
-    assert batch.force[2:].tobytes() == alone.force.tobytes()
-    assert (batch.force[0].max() < batch.force[2].max()).all()
-    assert "sponge" not in alone.trials.states

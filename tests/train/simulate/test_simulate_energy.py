@@ -20,6 +20,7 @@ from train.simulate.schema import CONTACT_EFFECTS, EFFECTS
 
 RANGES = {
     "stem_height_m": [0.3, 0.6],
+    "stem_kg": [0.005, 0.1],
     "mass_kg": [0.02, 1.0],
     "friction_static": [0.5, 1.1],
     "friction_kinetic": [0.1, 0.5],
@@ -87,9 +88,9 @@ class Ledger:
         """Book the work of this step, for the trials that took it."""
         t = active.batch
         if self.q is None:
-            self.q = t.everyone.equilibrium(0.0) - t.joints.lag
+            self.q = t.everyone.equilibrium(0.0) - t.arm.lag
             self.slide = np.zeros(t.n)
-            self.v = np.broadcast_to(t.joints.rate, t.arm.q.shape)
+            self.v = t.arm.rate
             self.speed = np.zeros(t.n)
         if self.meddle:
             self.meddle(t)

@@ -50,6 +50,13 @@ def test_arms_may_halt_at_different_times_once_they_push():
     assert (later == trials.everyone.equilibrium(halts)).all()
 
 
+def test_a_joint_may_have_another_speed_in_each_trial():
+    spread = {"rate_deg_s": [0.0, 0.0, 0.0, 8.0, 0.0]}
+    rates = run(scene(one_object(), spread=spread)).trials.arm.rate
+    assert np.count_nonzero(np.ptp(rates, axis=1)) == 1
+    assert len(set(rates[3].tolist())) == len(rates.T)
+
+
 def test_a_recordings_metadata_are_as_the_contract_says(demo, trial):
     assert trial.labels == {
         "category": "rigid-movable",

@@ -16,6 +16,7 @@ from train.simulate.contact import (
     spring_loads,
     total,
 )
+from train.simulate.schema import RATE_DEG_S
 from train.simulate.trials import Array, Trials
 
 STILL_M_S = 1e-6
@@ -37,7 +38,12 @@ def swing(t: Trials) -> None:
     steady solution of d q' + k (q - q_eq) = 0 for a ramp.
     """
     low, high = t.scene.kinematics.limits
-    rate = t.joints.rate
+    rate = np.repeat(np.array(t.scene.rate)[:, None], len(t), axis=1)
+    for joint in range(len(rate)):
+        if (name := f"{RATE_DEG_S}.{joint}") in t.scene.values:
+            rate[joint] += np.radians(t.values[name])
+    t.arm.rate = rate
+    t.arm.lag = t.joints.damping / t.joints.stiffness * rate
     start = np.repeat(np.array(t.scene.start)[:, None], len(t), axis=1)
     start[-1] += np.radians(t.values["roll_deg"])
     start = np.clip(start, low, high)
@@ -51,7 +57,7 @@ def swing(t: Trials) -> None:
         least = t.values["lead_s"] + PUSHES_S
         travel_s = np.maximum(t.values["travel_s"], least)
     t.arm.travel_s = np.minimum(travel_s, reached)
-    t.arm.q = t.equilibrium(0.0) - t.joints.lag
+    t.arm.q = t.equilibrium(0.0) - t.arm.lag
 
 
 def place(t: Trials) -> None:
@@ -67,10 +73,10 @@ def place(t: Trials) -> None:
     skin = t.scene.skin
     values = t.values
     z = t.scene.place_m + values["place_m"]
-    pose = t.scene.kinematics.pose(t.equilibrium(values["lead_s"]) - t.joints.lag)
+    pose = t.scene.kinematics.pose(t.equilibrium(values["lead_s"]) - t.arm.lag)
     along = pose.rotation[2]
     point = pose.origin + along * z
-    turned = cross(pose.axes, point[:, None] - pose.origins) * t.joints.rate
+    turned = cross(pose.axes, point[:, None] - pose.origins) * t.arm.rate
     speed = total(turned.swapaxes(0, 1))
     speed = speed - along * dot(speed, along)
     size = np.sqrt(dot(speed, speed))

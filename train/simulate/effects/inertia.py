@@ -52,7 +52,7 @@ class Momentum(Group):
 
 def swing(t: Trials) -> None:
     """Begin with the joints at the speed of the equilibrium point."""
-    t.add_state("inertia", Momentum, speed=np.repeat(t.joints.rate, len(t), axis=1))
+    t.add_state("inertia", Momentum, speed=t.arm.rate)
 
 
 def stand(t: Trials) -> None:

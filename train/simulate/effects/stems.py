@@ -18,25 +18,24 @@ class Stems(Group):
     Attributes:
         depth, stiffness: (stems, n) metres at which each is touched, and newtons a
             metre, 0 once it has slipped off.
+        blow: (stems, n) newtons a metre with which its mass resists in this step.
         damping: (stems, n) N s/m of each, 0 once it has slipped off.
         along: (stems, n) where each stands within the face, from 0 to 1.
         taxel, part: (stems, n) the place in the window's image of the first of the two
             rows that a stem lies between, and the part of its load that the second
             bears.
         order: (stems, n) the stems sorted by depth.
-        slopes, intercepts: (stems, n) the law of the stems still held, without damping.
         drag: (n,) N s/m of all bent stems.
     """
 
     depth: Array
     stiffness: Array
+    blow: Array
     damping: Array
     along: Array
     taxel: Places
     part: Array
     order: Places
-    slopes: Array
-    intercepts: Array
     drag: Array
 
 
@@ -70,13 +69,12 @@ def lay(t: Trials) -> None:
         Stems,
         depth=depth * values["stem_spread_m"],
         stiffness=stiffness,
+        blow=np.zeros(shape),
         damping=np.where(stiffness > 0.0, damping, 0.0),
         along=along,
         taxel=(low * window + (window // 2 + around)).astype(np.intp),
         part=place - low,
         order=np.zeros(shape, dtype=np.intp),
-        slopes=np.zeros(shape),
-        intercepts=np.zeros(shape),
     )
 
 
@@ -84,16 +82,6 @@ def law(t: Trials) -> None:
     """The law of the stems by depth."""
     stems = t.states["stems"]
     stems.order = t.set_bed_law(stems.depth, stems.stiffness)
-    let_go(t)
-
-
-def let_go(t: Trials) -> None:
-    """The law of the stems that are still held."""
-    stems = t.states["stems"]
-    order = stems.order
-    gaps = np.take_along_axis(stems.depth, order, 0)
-    stiffness = np.take_along_axis(stems.stiffness, order, 0)
-    stems.slopes, stems.intercepts = bed_law(gaps, stiffness)
 
 
 def hang(t: Trials) -> None:
@@ -105,8 +93,12 @@ def tune(t: Trials) -> None:
     """The law of the next step: the stems still held, and implicitly the damping of
     bent ones."""
     stems = t.states["stems"]
+    order = stems.order
+    gaps = np.take_along_axis(stems.depth, order, 0)
+    stiffness = np.take_along_axis(stems.stiffness + stems.blow, order, 0)
+    slopes, intercepts = bed_law(gaps, stiffness)
     drag = stems.drag / t.clock.h
-    t.set_lines(stems.slopes + drag, stems.intercepts + drag * t.contact.depth[0])
+    t.set_lines(slopes + drag, intercepts + drag * t.contact.depth[0])
 
 
 def settle(t: Trials) -> None:
@@ -114,10 +106,8 @@ def settle(t: Trials) -> None:
     stems = t.states["stems"]
     bent = t.contact.depth[0] - stems.depth
     slips = (bent > t.values["stem_slip_m"]) & (stems.stiffness > 0.0)
-    if slips.any():
-        stems.stiffness *= ~slips
-        stems.damping *= ~slips
-        let_go(t)
+    stems.stiffness *= ~slips
+    stems.damping *= ~slips
     stems.drag = total(np.where(bent > 0.0, stems.damping, 0.0))
     tune(t)
 
@@ -136,7 +126,7 @@ def image(t: Trials) -> None:
     """Put each stem's load on the two rows that it lies between."""
     stems = t.states["stems"]
     bent = np.maximum(t.contact.depth[0] - stems.depth, 0.0)
-    loads = bent * stems.stiffness
+    loads = bent * (stems.stiffness + stems.blow)
     borne = total(loads)
     loads = loads * (t.touch.force / np.where(borne > 0.0, borne, 1.0))
     rows, window, _ = t.touch.image.shape

@@ -1,0 +1,67 @@
+"""`make remount`: are grasps of a real hand told after it was taken off and put on again?
+
+    python -m tests.remount --recordings sdh2 icub
+
+Half of the recordings of each folder are fitted. The others are decided as they are,
+and as a remount leaves them: each joint's zero is off by 2 degrees, its gain by 3 %, or
+the clock by 5 %. Neighbouring joints err in opposite directions.
+"""
+
+import tempfile
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+import export
+import train
+from edge.model.model import Model
+from edge.recording import load
+from edge.saving import find
+from tests.bench import tables
+from tests.bench.program import start
+from tests.bench.shifts import answers, joints
+
+
+def off(angles, by):
+    """So much for each joint of angles (frames, dof), up and down in turns."""
+    return np.resize([by, -by], angles.shape[1])
+
+
+REMOUNTS = {
+    "none": lambda recording: recording,
+    "zeros off by 2 degrees": joints(lambda q: q + off(q, np.radians(2.0))),
+    "gains off by 3 %": joints(lambda q: q * (1.0 + off(q, 0.03))),
+    "clock 5 % slow": lambda recording: replace(recording, t=0.95 * recording.t),
+}
+
+
+def measure(recordings):
+    """Fit and decide, and write the table."""
+    rows = []
+    for folder in recordings:
+        paths = find([folder])
+        with tempfile.TemporaryDirectory() as out:
+            file = f"{out}/model.onnx"
+            export.save(file, train.fit(paths[::2], progress=False))
+            model = Model(file)
+        others = [*map(load, paths[1::2])]
+        for remount, change in REMOUNTS.items():
+            judged = answers(model, map(change, others))["object"]
+            right = judged["right"]
+            unusual = judged["flags"].map(lambda flags: "unusual" in flags)
+            rows.append(
+                {
+                    "recordings": Path(folder).name,
+                    "remount": remount,
+                    "answers": len(judged),
+                    "right": right.sum(),
+                    "right and unusual": (right & unusual).sum(),
+                    "wrong and unusual": (~right & unusual).sum(),
+                }
+            )
+    tables.write("remount", [rows], "make remount")
+
+
+if __name__ == "__main__":
+    start(measure, __doc__, ("--recordings", list, "folders of real recordings"))
