@@ -102,16 +102,18 @@ def early_options(
             continue
         *_, grid = (grid for grid in candidate.grids if not grid.tasks)
         for shrinkage in SHRINKAGES:
-            option = Choice(
-                grid.scaling,
-                MOST_COMPONENTS,
-                1,
-                grid.projection,
-                shrinkage,
-                grid.features,
-                grid.targets,
-            )
-            by_task = {task: replace(option, k=full[task].k) for task in full}
+            by_task = {
+                task: Choice(
+                    candidate.early,
+                    MOST_COMPONENTS,
+                    at_end.k,
+                    grid.projection,
+                    shrinkage,
+                    grid.features,
+                    grid.targets,
+                )
+                for task, at_end in full.items()
+            }
             options.append(by_task)
     return options
 
