@@ -12,7 +12,7 @@ with a discriminant of its own).
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -120,7 +120,7 @@ def early_options(
 
 def points_of(window_s: float) -> Floats:
     """The decision points at which the options are judged."""
-    return np.array([*(share * window_s for share in SHARES), window_s])
+    return window_s * np.array([*SHARES, 1.0])
 
 
 def settle_early(
@@ -146,17 +146,7 @@ def settle_early(
     """
     y = vectors.y
     left_out = stratified_folds(y[finest(y)], FOLDS)
-    fewest = {}
-    for task, labels in y.items():
-        labelled = np.bincount(left_out[labels != ""])
-        fewest[task] = int(labelled.sum() - labelled.max())
-    runs = []
-    for option in options:
-        at_points = [
-            {task: replace(c, k=min(c.k, fewest[task])) for task, c in at.items()}
-            for at in (*[option] * len(SHARES), full)
-        ]
-        runs.append([at_points] * FOLDS)
+    runs = [[[*[option] * len(SHARES), full]] * FOLDS for option in options]
     answered = held_out(vectors, left_out, runs, jobs, heading)
     factors = factors_of(y)
     best: dict[str, list[Choice]] = {}

@@ -10,7 +10,7 @@ from joblib import delayed
 from edge.arrays import Booleans, Floats, Integers
 from edge.model.info import margin
 from train.data.vectors import Strings, Vectors
-from train.model.pipeline import Choices, ContactClassifier, Fits
+from train.model.pipeline import Choices, ContactClassifier, Fits, fittable
 from train.threads import in_processes, single_thread
 
 AtPoints = Sequence[Choices]
@@ -95,7 +95,8 @@ def _fold(
     by_run = []
     with single_thread():
         for choices in runs:
-            models = at_points(choices, training, fits)
+            possible = [fittable(at_point, training.y) for at_point in choices]
+            models = at_points(possible, training, fits)
             by_run.append(answers(models, vectors.X[:, left_out]))
     return by_run
 
@@ -124,6 +125,5 @@ def at_points(
     for task in choices[-1]:
         slopes = [model.tasks_[task].slope for model in early]
         for model in early:
-            fitted = model.tasks_[task]
-            model.tasks_[task] = replace(fitted, slope=fmean(slopes))
+            model.tasks_[task] = replace(model.tasks_[task], slope=fmean(slopes))
     return models

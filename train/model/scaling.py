@@ -69,9 +69,9 @@ def scale_of(
 
     Args:
         X: (n, p).
-        method: one of `OF_PAPER`. Method V brings contact_motion to the range of
-            max_force and contact_area and leaves all else alone; without them it is no
-            scaling.
+        method: one of `SCALINGS`; `BY_COLUMN` has the gains of Method IV here. Method V
+            brings contact_motion to the range of max_force and contact_area and leaves
+            all else alone; without them it is no scaling.
         features: names of the types, in the order of X.
         widths: columns of each; equal where None.
 
@@ -82,7 +82,7 @@ def scale_of(
         InputError: the method is unknown, or the columns are not those of the features.
     """
     sizes = np.array(widths_of(X.shape[1], features, widths))
-    if method not in OF_PAPER:
+    if method not in SCALINGS:
         raise InputError(
             f"scaling must be one of {', '.join(SCALINGS)}, not {method!r}"
         )
@@ -94,7 +94,7 @@ def scale_of(
     largest, powers = np.frexp(magnitudes)
     if method in ("I", "II"):
         return _inverse(largest, powers)
-    if method == "IV":
+    if method in ("IV", BY_COLUMN):
         wide = np.array([feature(name).wide for name in features])
         small = np.ldexp(X, -np.repeat(powers, sizes))
         deviations = _deviations(small, sizes, wide)
@@ -152,13 +152,11 @@ def centred_and_scaled(
     X = np.ascontiguousarray(X, dtype=np.float64)
     with np.errstate(over="ignore", invalid="ignore"):
         mean = column_means(X)
-        of_types = "IV" if method == BY_COLUMN else method
-        gains = scale_of(X, of_types, features, widths)
+        gains = scale_of(X, method, features, widths)
         gain = np.repeat(gains, widths_of(X.shape[1], features, widths))
         d = (X - mean) * gain
         if method == BY_COLUMN:
-            variance = np.square(d).mean(axis=0)
-            blend = (1.0 - SHARE_OF_TYPE) * variance + SHARE_OF_TYPE
+            blend = (1.0 - SHARE_OF_TYPE) * d.var(axis=0) + SHARE_OF_TYPE
             gain /= np.sqrt(blend)
             d = (X - mean) * gain
     largest = float(np.abs(d).max(initial=0.0))

@@ -64,7 +64,7 @@ from train.model.novelty import (
     limits_of,
     telling_columns,
 )
-from train.model.pipeline import Choices, Fits
+from train.model.pipeline import Choices
 from train.model.rules import RISK, Course, agreeing, candidates, certify
 from train.threads import single_thread
 
@@ -217,8 +217,9 @@ class SequentialClassifier:
         self.n_features_in_ = len(self.columns_)
         vectors = vectors.of(features)
         with single_thread():
-            fits: list[Fits] = [{} for _ in vectors.X]
-            self.decision_points_ = at_points(self.choices_at, vectors, fits)
+            self.decision_points_ = at_points(
+                self.choices_at, vectors, [{} for _ in vectors.X]
+            )
         return vectors
 
     def _fit_novelty(self, vectors: Vectors, folds: Integers) -> None:
