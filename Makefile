@@ -239,16 +239,19 @@ shifts: $(DEV) $(SIMULATED)/.made
 	$(BIN)/python -m export --data $(SIMULATED) --out $(OUT)/shifts $(EXPORT)
 	$(BIN)/python -m tests.bench.shifts --model $(OUT)/shifts/model.onnx
 
-# Each folder of DATA is a data set of its own; by default five seeds of the scene.
+# Each folder of DATA is a data set of its own; by default five seeds of the scene, with 140
+# trials each and with 560: STOPPING_TRIALS of each object in each condition.
+STOPPING_TRIALS ?= 5 20
 ifdef DATA
 STOPPED := $(DATA)
 else
-STOPPED := $(foreach seed,2012 2013 2014 2015 2016,$(OUT)/stopping/$(seed))
+STOPPED := $(foreach trials,$(STOPPING_TRIALS),$(foreach seed,2012 2013 2014 2015 2016,\
+  $(OUT)/stopping/$(trials)/$(seed)))
 stopping: $(addsuffix /.made,$(STOPPED))
 endif
 
 $(OUT)/stopping/%/.made: $(READY) $(SCENE)
-	$(BIN)/python -m train simulate $(SCENE) --seed $* --out $(@D)
+	$(BIN)/python -m train simulate $(SCENE) --trials $(*D) --seed $(*F) --out $(@D)
 	@touch $@
 
 # An environment of its own: aeon 1.6.0 does not take the numpy and pandas that

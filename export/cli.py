@@ -87,7 +87,7 @@ OPTIONS: dict[str, dict[str, Any]] = {
     },
     "--scaling": {
         "choices": SCALINGS,
-        "help": "fix the scaling (paper, Eqs. 1 to 5)",
+        "help": "fix the scaling (paper, Eqs. 1 to 5; or by column)",
     },
     "--components": {
         "type": count,

@@ -12,6 +12,7 @@ the trees, and than the trees whose set is chosen. Standard errors are those of 
 paired differences over the data sets.
 """
 
+from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -43,7 +44,6 @@ SETS = (
 NAMES = tuple(dict.fromkeys(" ".join(SETS).split()))
 FIXED = "fixed window, % wrong"
 SURE = "when sure"
-TREES_FIXED = "extra trees, fixed window"
 TREES = "extra trees"
 CHOSEN = "extra trees, set chosen"
 
@@ -68,19 +68,17 @@ class Trees(NamedTuple):
 
 
 def extra_trees(X, labels, folds):
-    """Extra trees of a set of features, X (points, n, p): their curve at fixed windows,
-    and what they cost when sure."""
+    """Extra trees of a set of features, X (points, n, p)."""
     model = ExtraTreesClassifier(random_state=0)
     options = {"cv": PredefinedSplit(folds), "method": "predict_proba"}
     shares = np.stack([cross_val_predict(model, x, labels, **options) for x in X])
     classes = np.unique(labels)
     right = classes[shares.argmax(axis=2)] == labels
-    fixed = list(zip(SECONDS, 1.0 - right.mean(axis=1), strict=True))
     passed = shares.max(axis=2) >= THRESHOLDS[:, None, None]
     passed[:, -1] = True
     stops = passed.argmax(axis=1)
     wrong = ~right[stops, np.arange(len(labels))]
-    return fixed, Trees(SECONDS[stops], wrong)
+    return Trees(SECONDS[stops], wrong)
 
 
 def of_chosen_set(by_set, folds):
@@ -103,10 +101,8 @@ def of_chosen_set(by_set, folds):
 
 def peers(by_set, labels, folds):
     """{peer: its curves on a task, one for each set of features}."""
-    rivals = [extra_trees(X, labels, folds) for X in by_set]
-    fixed, trees = zip(*rivals, strict=True)
+    trees = [extra_trees(X, labels, folds) for X in by_set]
     return {
-        TREES_FIXED: fixed,
         TREES: [of_set.curve() for of_set in trees],
         CHOSEN: [of_chosen_set(trees, folds)],
     }
@@ -159,15 +155,22 @@ def judge(data, quick, jobs):
 
 
 def measure(data, quick, jobs):
-    """Measure; print and write the table."""
-    sets = [judge(folder, quick, jobs) for folder in data]
-    rows = []
-    for task in sets[0]:
-        curves = [of_set[task] for of_set in sets if task in of_set]
-        for seconds in DECISION_POINTS_S:
-            row = {"task": task, "mean time, s": f"{seconds:.1f}"}
-            rows.append(row | compare(curves, seconds))
-    tables.write("stopping", [rows])
+    """Measure; print and write a table for each size of the data sets."""
+    of_size = {}
+    for folder in data:
+        sets = of_size.setdefault(len([*Path(folder).rglob("*.npz")]), [])
+        sets.append(judge(folder, quick, jobs))
+    tables.write("stopping", [rows(trials, sets) for trials, sets in of_size.items()])
+
+
+def rows(trials, sets):
+    """The rows of data sets of so many trials."""
+    return [
+        {"trials": trials, "task": task, "mean time, s": f"{seconds:.1f}"}
+        | compare([of_set[task] for of_set in sets if task in of_set], seconds)
+        for task in sets[0]
+        for seconds in DECISION_POINTS_S
+    ]
 
 
 def compare(curves, seconds):
@@ -175,10 +178,10 @@ def compare(curves, seconds):
     sure, and the peers; and differences with their standard errors."""
     wrong = {
         name: np.array([at(of_set[name], seconds) for of_set in curves])
-        for name in (FIXED, TREES_FIXED, SURE, TREES, CHOSEN)
+        for name in (FIXED, SURE, TREES, CHOSEN)
     }
     means = {name: of_sets.mean() for name, of_sets in wrong.items()}
-    row = {name: cell(means[name]) for name in (FIXED, TREES_FIXED, SURE)}
+    row = {name: cell(means[name]) for name in (FIXED, SURE)}
     row["gain"] = difference(wrong[FIXED] - wrong[SURE])
     for name in (TREES, CHOSEN):
         row[name] = cell(means[name])
@@ -201,7 +204,11 @@ if __name__ == "__main__":
     start(
         measure,
         __doc__,
-        ("--data", list, "folders of recordings, each a data set"),
+        (
+            "--data",
+            list,
+            "folders of recordings, each a data set; those of one size share a table",
+        ),
         ("--quick", False, "the settings of a quick export"),
         ("--jobs", 2, "processes"),
     )

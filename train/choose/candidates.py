@@ -15,6 +15,7 @@ from train.data.vectors import Labels
 from train.model.agreement import products
 from train.model.pipeline import Choice
 from train.model.projection import KINDS
+from train.model.scaling import BY_COLUMN
 
 PLAIN = (
     ("paper",),
@@ -60,12 +61,14 @@ OF_SKIN = (
 OF_JOINTS = (("joints",), ("joints", "posture"))
 """For known things, each of `OF_SKIN` is a candidate with each of these, and with shear
 and without, where the recordings have them."""
-EARLY_WITH_JOINTS = (
-    ("contact", "sqrt_joints"),
-    ("sqrt_joints",),
-)
-"""Those tried at early decision points of recordings with joint angles. The arm tells
-that a thing has begun to move before the skin does. Roots let a small motion count."""
+EARLY_WITH_JOINTS = {
+    ("contact", "sqrt_joints"): BY_COLUMN,
+    ("sqrt_joints",): "IV",
+}
+"""Those tried at early decision points of recordings with joint angles, and their
+scaling. The arm tells that a thing has begun to move before the skin does. Roots let a
+small motion count. Beside other features a motion that begins counts as much as a large
+one only where every column has its own scale."""
 DRAWN = ("contact",)
 DRAWN_WITH_JOINTS = ("contact", "joints")
 """The combination tried for touches of simulated things that are drawn from kinds
@@ -95,7 +98,7 @@ class Candidate:
         projection: one of `train.model.projection.KINDS`.
         grids: the settings tried with them.
         full: whether it is tried at the full window.
-        early: whether it is tried at early decision points.
+        early: its scaling at early decision points; empty where it is not tried there.
         known: whether it is tried for known things alone, where no groups are left out.
     """
 
@@ -103,7 +106,7 @@ class Candidate:
     projection: str
     grids: tuple[SearchGrid, ...]
     full: bool = True
-    early: bool = False
+    early: str = ""
     known: bool = False
 
     @property
@@ -184,12 +187,13 @@ def candidates(
         if fixed.asks or mode.tries(kind, sets):
             grid = _grid(sets, kind, fixed, mode)
             grids = _scaled(_with_targets(grid, y, mode), sets, fixed)
+            early = mode.early.get(sets, "")
             candidate = Candidate(
                 sets,
                 kind,
                 grids,
                 full=sets in (*mode.full, *mode.known),
-                early=sets in mode.early,
+                early=early and (fixed.scaling or early),
                 known=sets not in (*mode.full, *mode.early),
             )
             combinations.append(candidate)
@@ -202,8 +206,8 @@ class Mode:
 
     Attributes:
         full: feature sets that are tried together at the full window.
-        early: those of early decision points; none where these have the settings of the
-            full window.
+        early: {those of early decision points: their scaling}; none where these have the
+            settings of the full window.
         known: those that are tried for known things besides.
         shrinkages: of discriminants.
         components: numbers of coordinates.
@@ -213,7 +217,7 @@ class Mode:
     """
 
     full: Sequence[tuple[str, ...]]
-    early: Sequence[tuple[str, ...]]
+    early: Mapping[tuple[str, ...], str]
     known: Sequence[tuple[str, ...]]
     shrinkages: tuple[float, ...]
     components: tuple[int, ...]
@@ -226,7 +230,7 @@ class Mode:
         """The mode of things that a scene drew from kinds."""
         return cls(
             full=[DRAWN_WITH_JOINTS if joints else DRAWN],
-            early=[],
+            early={},
             known=[],
             shrinkages=DRAWN_SHRINKAGES,
             components=DRAWN_COMPONENTS,
@@ -241,10 +245,10 @@ class Mode:
         usual = WITH_JOINTS if joints else PLAIN
         angles = ("joints",) if joints else ()
         sheared = [(*sets, *angles) for sets in WITH_SHEAR] if shear else []
-        has_early = joints and not quick
+        early = EARLY_WITH_JOINTS | dict.fromkeys(sheared, BY_COLUMN)
         return cls(
             full=[*usual[: QUICK if quick else None], *sheared],
-            early=[*EARLY_WITH_JOINTS, *sheared] if has_early else [],
+            early=early if joints and not quick else {},
             known=[] if quick else _beside_every_other(joints, shear),
             shrinkages=QUICK_SHRINKAGES if quick else SHRINKAGES,
             components=COMPONENTS,
@@ -258,7 +262,7 @@ class Mode:
         if not fixed.asks:
             return self
         full = self.full if fixed.features is None else [tuple(fixed.features)]
-        return replace(self, full=full, early=[], known=[])
+        return replace(self, full=full, early={}, known=[])
 
     def tries(self, kind: str, sets: Sequence[str]) -> bool:
         """Whether a projection of some feature sets is tried by default.

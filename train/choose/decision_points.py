@@ -1,5 +1,7 @@
 """The usual decision points of a model: as many as calibration and its size allow."""
 
+import numpy as np
+
 from edge.touch.features import WINDOW_S
 from train.choose.options import FitOptions
 from train.choose.settings import Settings
@@ -132,9 +134,5 @@ def _bytes_of(choices: Choices, dataset: DataSet, samples: int) -> int:
 
 def _rising(step_s: float, window_s: float) -> list[float]:
     """Decision points one every `step_s`, up to the window."""
-    points = []
-    point_s = round(max(FIRST_S, step_s), 6)
-    while point_s < window_s:
-        points.append(point_s)
-        point_s = round(max(FIRST_S, step_s) + len(points) * step_s, 6)
-    return [*points, window_s]
+    before = np.arange(max(FIRST_S, step_s), window_s - 1e-6, step_s)
+    return [*before.round(6).tolist(), window_s]

@@ -12,7 +12,7 @@ with a discriminant of its own).
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -102,23 +102,25 @@ def early_options(
             continue
         *_, grid = (grid for grid in candidate.grids if not grid.tasks)
         for shrinkage in SHRINKAGES:
-            option = Choice(
-                grid.scaling,
-                MOST_COMPONENTS,
-                1,
-                grid.projection,
-                shrinkage,
-                grid.features,
-                grid.targets,
-            )
-            by_task = {task: replace(option, k=full[task].k) for task in full}
+            by_task = {
+                task: Choice(
+                    candidate.early,
+                    MOST_COMPONENTS,
+                    at_end.k,
+                    grid.projection,
+                    shrinkage,
+                    grid.features,
+                    grid.targets,
+                )
+                for task, at_end in full.items()
+            }
             options.append(by_task)
     return options
 
 
 def points_of(window_s: float) -> Floats:
     """The decision points at which the options are judged."""
-    return np.array([*(share * window_s for share in SHARES), window_s])
+    return window_s * np.array([*SHARES, 1.0])
 
 
 def settle_early(
@@ -144,17 +146,7 @@ def settle_early(
     """
     y = vectors.y
     left_out = stratified_folds(y[finest(y)], FOLDS)
-    fewest = {}
-    for task, labels in y.items():
-        labelled = np.bincount(left_out[labels != ""])
-        fewest[task] = int(labelled.sum() - labelled.max())
-    runs = []
-    for option in options:
-        at_points = [
-            {task: replace(c, k=min(c.k, fewest[task])) for task, c in at.items()}
-            for at in (*[option] * len(SHARES), full)
-        ]
-        runs.append([at_points] * FOLDS)
+    runs = [[[*[option] * len(SHARES), full]] * FOLDS for option in options]
     answered = held_out(vectors, left_out, runs, jobs, heading)
     factors = factors_of(y)
     best: dict[str, list[Choice]] = {}

@@ -48,7 +48,7 @@ from edge.touch.features import FEATURES
 from train.data.folds import finest, stratified_folds
 from train.data.vectors import Strings, Vectors
 from train.model.curves import Curve, Evidence, cross_fitted
-from train.model.held_out import AtPoints, HeldOut, answers, held_out
+from train.model.held_out import AtPoints, HeldOut, answers, at_points, held_out
 from train.model.never_met import (
     SHARE,
     known_of,
@@ -66,7 +66,7 @@ from train.model.novelty import (
     least_deviations,
     limits_of,
 )
-from train.model.pipeline import Choices, ContactClassifier
+from train.model.pipeline import Choices
 from train.model.rules import RISK, Course, agreeing, candidates, certify
 from train.threads import single_thread
 
@@ -218,11 +218,10 @@ class SequentialClassifier:
         self.columns_ = vectors.columns_of(features)
         self.n_features_in_ = len(self.columns_)
         vectors = vectors.of(features)
-        self.decision_points_ = []
         with single_thread():
-            for at_point, x in zip(self.choices_at, vectors.X, strict=True):
-                model = ContactClassifier.of(at_point, replace(vectors, X=x))
-                self.decision_points_.append(model)
+            self.decision_points_ = at_points(
+                self.choices_at, vectors, [{} for _ in vectors.X]
+            )
         return vectors
 
     def _fit_novelty(self, vectors: Vectors, folds: Integers) -> None:

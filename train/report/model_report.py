@@ -328,8 +328,12 @@ def _features(exported: Exported) -> Section:
         row: Row = {"feature": name}
         for task, answer in exported.answers.items():
             pulls = [why.pulls for why in answer.explained.values() if why.pulls]
-            shares = [_share(name, of_answer) for of_answer in pulls] or [0.0]
-            row[f"{task}, % of pull"] = percent(float(np.mean(shares)))
+            shares = [
+                abs(of_answer.get(name, 0.0))
+                / (sum(map(abs, of_answer.values())) or 1.0)
+                for of_answer in pulls
+            ]
+            row[f"{task}, % of pull"] = percent(float(np.mean(shares or [0.0])))
         row["unit"] = "" if unit == "1" else unit
         row["values"] = widths[name]
         rows.append(row)
@@ -341,11 +345,6 @@ def _features(exported: Exported) -> Section:
     ]
     table = Table("features", "Each feature's share of the pull", rows, narrow=3)
     return Section("Features", text, [table])
-
-
-def _share(name: str, pulls: Mapping[str, float]) -> float:
-    """A feature's share of all pulls."""
-    return abs(pulls.get(name, 0.0)) / (sum(map(abs, pulls.values())) or 1.0)
 
 
 def _learning(exported: Exported) -> Section:

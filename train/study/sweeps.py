@@ -10,7 +10,7 @@ from edge.touch.features import FEATURES
 from edge.touch.layout import SkinLayout
 from train.choose.evaluate import Result
 from train.data.vectors import Labels
-from train.model.scaling import SCALINGS
+from train.model.scaling import OF_PAPER
 from train.report import figures
 from train.report.score import grid_search, score
 from train.report.section import Row, Section, Table
@@ -118,7 +118,7 @@ def scaling(context: Context) -> Section:
         "72.14 % and 62.86 %). Either its statistics were not taken over all trials, "
         "or its PCA did not subtract the mean."
     )
-    cases = {method: (context.vectors(), context.labels, method) for method in SCALINGS}
+    cases = {method: (context.vectors(), context.labels, method) for method in OF_PAPER}
     return _compared(
         context,
         "scaling",

@@ -62,7 +62,6 @@ def early(measured: Measured) -> Section:
             "at most s": round(rule.latest_s, 3),
             "points over waiting": points(rule.gain),
             "no label %": percent(rule.unknown),
-            "decided early %": percent(rule.early),
         }
         for task, compared in measured.comparisons.items()
         for rule in compared.certified

@@ -37,7 +37,6 @@ class Certified:
             trained ones gets no label, which counts as wrong.
         waited: (n,) whether the same contact is decided rightly at the full window.
         unknown: share of decisions without a label.
-        early: share of contacts decided before the full window.
         seconds: (n,) time of each decision.
     """
 
@@ -45,7 +44,6 @@ class Certified:
     right: Booleans
     waited: Booleans
     unknown: float
-    early: float
     seconds: Floats
 
     @property
@@ -238,7 +236,6 @@ def _certified(
                 right=~wrong,
                 waited=~late,
                 unknown=unknown,
-                early=float((at < len(seconds) - 1).mean()),
                 seconds=seconds[at],
             )
         )

@@ -52,8 +52,6 @@ class TestSureDecisions:
             np.array([[False, True], [False, False]]),
         )
         everything = np.array([True, True])
-        assert decided.error(np.array([0.4]), everything) == 0.5
-        assert decided.error(np.array([0.6]), everything) == pytest.approx(0.25)
         assert decided.error(np.array([0.4, 0.6]), everything) == pytest.approx(0.375)
         assert decided.error(np.array([0.6]), np.array([True, False])) == 0.0
 
@@ -79,8 +77,6 @@ def test_decision_points_before_the_full_window_have_settings_where_joints_are_k
     early = early_settings(make_touch, tmp_path, arm=True)
     assert early.choices["softness"].projection == "lda"
     assert len(early.by_fold) == 10
-    # The number of neighbours is that of the full window, as the graph has one.
-    assert {c["softness"].k for c in (early.choices, *early.by_fold)} == {3}
 
 
 def test_without_joints_they_have_the_settings_of_the_full_window(make_touch, tmp_path):
@@ -130,9 +126,9 @@ def test_the_option_that_errs_least_often_when_sure_is_settled(settled):
 
 
 def test_what_is_settled_without_a_fold_counts_the_trials_of_the_others(settled):
-    """The first feature tells the trials of six folds of ten; without one of them, and
-    noise aside, five of nine."""
-    choice, by_fold = settled(np.arange(120) < 65)
+    """The first feature tells the trials of five folds of ten and two more; without one
+    of them, of four."""
+    choice, by_fold = settled(np.arange(120) < 62)
     assert choice == "max_force"
     assert by_fold[9] == "max_force"
     assert by_fold[0] == "contact_area"

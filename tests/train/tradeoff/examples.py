@@ -32,7 +32,7 @@ def rule(error=0.1, right=95, mean_s=0.5):
     the mean."""
     hits = np.arange(100) < right
     seconds = mean_s + np.where(np.arange(100) % 2, 0.1, -0.1)
-    return Certified(error, hits, hits, 0.0, 1.0, seconds)
+    return Certified(error, hits, hits, 0.0, seconds)
 
 
 def measured(points, certified, **changes):

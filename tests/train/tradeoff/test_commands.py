@@ -31,10 +31,6 @@ def test_a_point_of_the_front():
 
 
 def test_the_report_again_with_the_options_that_it_was_made_with():
-    assert commands("my touches").tradeoff(COST) == (
-        "python -m train tradeoff --data 'my touches' --board build/tradeoff/board.json "
-        f"--out build/tradeoff {COST}"
-    )
     assert commands("mine", quick=True, task="object").tradeoff(COST) == (
         "python -m train tradeoff --data mine --board build/tradeoff/board.json "
         f"--out build/tradeoff --quick --task object {COST}"

@@ -236,7 +236,6 @@ class TestEarly:
         # The rates 0.05 and 0.1 are refused; one rule serves 0.2 to 0.3.
         assert (late.error, soon.error) == (0.15, 0.2)
         assert (late.mean_s, soon.mean_s) == (1.2, 0.6)
-        assert (late.early, soon.early) == (0.0, 1.0)
         assert (late.unknown, soon.unknown) == (0.25, 0.0)
         # At the full window one more is right and one names nothing.
         assert soon.result.right == late.result.right == 3
