@@ -218,7 +218,7 @@ def kernel_channels(
     Raises:
         InputError: the feature was not measured.
     """
-    rows: Integers | None = series.kernel_cells
+    rows: Integers | None = series.taxel_kernels
     if name == "zone_kernels":
         complete = len(series.zones) == len(ZONES)
         zones = [sums[:, :ZONE_WIDTH] for sums in series.zones.values()]

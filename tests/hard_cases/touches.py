@@ -1,6 +1,4 @@
-"""Kernels, moments and shear of touches with large numbers."""
-
-from fractions import Fraction
+"""Kernels and moments of touches with large numbers."""
 
 import numpy as np
 from hypothesis import strategies as st
@@ -12,7 +10,6 @@ from edge.touch.zones import quantities
 from tests.edge.touch.pressed import zones_of
 from tests.edge.touch.test_kernels import by_hand
 from tests.edge.touch.test_measures import moments
-from tests.edge.touch.test_shear import twist_of
 from tests.hard_cases.cases import SEEDS, Case, Ladder
 
 COLS = 8
@@ -32,36 +29,28 @@ def kernels_error(bits, seed):
 
 
 def zone(rows, seed):
-    """Random taxels of a skin with so many rows (row, column, counts), the whole
-    numbers of their zone, and its quantities."""
+    """Random taxels of a skin with so many rows (row, column, counts), and the
+    quantities of their zone."""
     rng = np.random.default_rng(seed)
     shape = (rows, COLS)
-    layout = SkinLayout(rows, COLS, False, PITCH, threshold_counts=10, axes=3)
+    layout = SkinLayout(rows, COLS, False, PITCH, threshold_counts=10)
     counts = rng.integers(11, 65536, shape) * (rng.random(shape) < 0.3)
     counts[rng.integers(0, rows), 0] = 65535
-    shear = rng.integers(-32768, 32768, (*shape, 2))
-    frame = Frame(0.0, counts.astype(np.uint16), shear=shear.astype(np.int16))
-    numbers = zones_of(layout, frame, ["skin_force", "skin_twist"])["skin"]
+    frame = Frame(0.0, counts.astype(np.uint16))
+    numbers = zones_of(layout, frame, ["skin_force"])["skin"]
     taxels = [(*place, counts[*place].item()) for place in np.argwhere(counts).tolist()]
     values = quantities(np.array([numbers]), layout)
-    return taxels, numbers, {name: float(v[0]) for name, v in values.items()}
+    return taxels, {name: float(v[0]) for name, v in values.items()}
 
 
 def moments_error(rows, seed):
     """Largest error of a zone's spreads, slant and length, over their size."""
-    taxels, _, measured = zone(rows, seed)
+    taxels, measured = zone(rows, seed)
     true = moments(taxels)
     sizes = {name: true[name] for name in ("spread_along", "spread_around", "length")}
     sizes["slant"] = sizes["spread_along"] * sizes["spread_around"]
     errors = [abs(measured[n] - true[n]) / size for n, size in sizes.items() if size]
     return float(max(errors, default=0.0))
-
-
-def shear_error(rows, seed):
-    """Error of the twist, over the size of its two parts."""
-    _, numbers, measured = zone(rows, seed)
-    twist, size = twist_of(numbers, PITCH)
-    return float(abs(Fraction(measured["twist"]) - twist) / (size or 1))
 
 
 LONGER = Ladder("rows of taxels", [16, 64, 256, 1024, 4096], "rows", "16 and 12")
@@ -83,16 +72,6 @@ CASES = [
         "fractions, roots to 50 digits",
         "error over the size",
         moments_error,
-        [{"rows": 16, "seed": 0}],
-        LENGTHS,
-        LONGER,
-        bound=1e-15,
-    ),
-    Case(
-        "shear: the twist of scattered taxels",
-        "fractions",
-        "error over its two parts",
-        shear_error,
         [{"rows": 16, "seed": 0}],
         LENGTHS,
         LONGER,
