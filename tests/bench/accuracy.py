@@ -1,18 +1,37 @@
-"""`make accuracy`: the accuracies that an export prints, on simulated and on real sets.
+"""`make accuracy`: the accuracies that an export prints, and those of peers.
 
 Each set is fitted as `make export` would fit it. The accuracies are nested: of the
-whole choice, on trials that took no part in it, with the interval of the exported model
+entire choice, on trials that took no part in it, with the interval of the exported model
 on other trials, or on other objects or kinds where entire groups are left out.
+
+The second table is of simulated skins like those of other people. Each fold is decided
+by the board's classifier, with a model of the other folds, and by peers that see the
+raw channels of entire recordings.
 """
 
 import tempfile
 from pathlib import Path
 
+import numpy as np
+from aeon.classification.convolution_based import MiniRocketClassifier
+from joblib import cpu_count
+from sklearn.ensemble import ExtraTreesClassifier
+from sklearn.model_selection import PredefinedSplit, cross_val_score
+
 import train
+from edge.model.model import Model
+from edge.saving import save as save_recording
+from export.api import save
 from tests.bench import tables
 from tests.bench.program import start
+from tests.bench.shifts import decisions
+from tests.other_skins import SKINS, touch
 from train.__main__ import main as train_command
+from train.data.folds import stratified_folds
 from train.progress import bar
+from train.report.work import Workers
+
+FOLDS = 5
 
 
 def recorded(folder, grasps):
@@ -26,8 +45,8 @@ def recorded(folder, grasps):
     if grasps:
         out = folder / "sdh2"
         train_command(["import", "sdh2", grasps, "--out", str(out)])
-        touch = {"features": ["moments"], "projection": "lda"}
-        yield "SDH-2 grasps, by touch alone", out, touch
+        by_touch = {"features": ["moments"], "projection": "lda"}
+        yield "SDH-2 grasps, by touch alone", out, by_touch
         yield "SDH-2 grasps, with joint angles, which leak", out, {}
 
 
@@ -48,14 +67,58 @@ def accuracies(name, folder, options):
         }
 
 
+def beside_peers(name):
+    """A row: accuracies on the folds of a skin's set."""
+    skin = SKINS[name]
+    numbers = np.indices((skin.objects, skin.trials)).reshape(2, -1).T.tolist()
+    recordings = [touch(skin, *number) for number in numbers]
+    labels = np.array([recording.labels["object"] for recording in recordings])
+    folds = stratified_folds(labels, FOLDS)
+    right = 0
+    for fold in range(FOLDS):
+        with tempfile.TemporaryDirectory() as folder:
+            for i in np.flatnonzero(folds != fold):
+                save_recording(f"{folder}/{i:03}.npz", recordings[i])
+            save(f"{folder}/model.onnx", train.fit(folder, jobs=1))
+            model = Model(f"{folder}/model.onnx")
+        answers = decisions(
+            model, [recordings[i] for i in np.flatnonzero(folds == fold)]
+        )
+        right += (answers["label"] == answers["truth"]).sum()
+    row = {"recordings": name, "trials": len(labels), "labels": skin.objects}
+    row["export"] = f"{right / len(labels):.1%}"
+    X = np.stack([channels(recording) for recording in recordings])
+    peers = {
+        "MiniRocket, ridge": (MiniRocketClassifier(random_state=0), X),
+        "extra trees": (
+            ExtraTreesClassifier(300, random_state=0),
+            X.reshape(len(X), -1),
+        ),
+    }
+    for peer, (estimator, rows) in peers.items():
+        scores = cross_val_score(estimator, rows, labels, cv=PredefinedSplit(folds))
+        weights = np.bincount(folds)
+        row[peer] = f"{np.average(scores, weights=weights):.1%}"
+    return row
+
+
+def channels(recording):
+    """(channels, frames) all that a recording holds."""
+    parts = (recording.frames, recording.shear, recording.joints)
+    flat = [part.reshape(len(part), -1) for part in parts if part is not None]
+    return np.hstack(flat).astype(np.float32).T
+
+
 def measure(grasps):
-    """Fit the sets, print and write the table."""
+    """Fit the sets, print and write the tables."""
     rows = []
     with tempfile.TemporaryDirectory() as name:
         sets = list(recorded(Path(name), grasps))
         for label, recordings, options in bar(sets, desc="sets"):
             rows += accuracies(label, recordings, options)
-    tables.write("accuracy", [rows])
+    cases = [(name,) for name in SKINS]
+    beside = Workers(cpu_count()).map("skins", beside_peers, cases)
+    tables.write("accuracy", [rows, beside])
 
 
 if __name__ == "__main__":
