@@ -55,7 +55,7 @@ OF_SKIN = (
     ("taxels",),
     ("sqrt_taxels",),
     ("kernels",),
-    ("taxels", "kernels"),
+    ("sqrt_taxels", "kernels"),
 )
 OF_JOINTS = (("joints",), ("joints", "posture"))
 """For known things, each of `OF_SKIN` is a candidate with each of these, and with shear
