@@ -10,7 +10,7 @@ PIP := $(BIN)/$(PINNED) constraints.txt
 export OPENBLAS_NUM_THREADS := 1
 
 .PHONY: help venv test test-all test-busy lint types export demo demo-data golden study tradeoff wheel wheel-test \
-  board-test browser-test c-test kernel-test peers-test service-test hard-cases hard-cases-versions mutants fuzz kills accuracy bench transfer shear docs faults risk shifts \
+  board-test browser-test c-test kernel-test peers-test service-test hard-cases hard-cases-versions mutants fuzz kills accuracy bench transfer docs faults risk shifts \
   stopping soak measured constraints clean
 
 help:
@@ -38,10 +38,9 @@ help:
 	@echo "  make service-test  start, hang and restart the service under a systemd of its own (root)"
 	@echo "  make requirements-board.txt   pin the board's packages with hashes"
 	@echo "Measurements"
-	@echo "  make accuracy      the accuracies that export prints, of simulated and (GRASPS=folder) real sets"
+	@echo "  make accuracy      the accuracies that export prints, of simulated and (GRASPS=folder) real sets, and of peers"
 	@echo "  make bench         speed beside the alternatives"
 	@echo "  make transfer      score a model of SCENE on trials from another engine (MuJoCo)"
-	@echo "  make shear         how much sooner tasks are decided with shear (a quarter of an hour)"
 	@echo "  make faults        the cost of each fault on the skin's wires, as a table"
 	@echo "  make risk          how often certified errors, mean times and FRONT's intervals are not kept"
 	@echo "  make shifts        what touches unlike the training do to answers, and whether doubt tells it"
@@ -170,9 +169,6 @@ docs/measured/study.md: STUDY := --seeds 8
 docs/measured/study.md: study
 	$(BIN)/python -m tests.bench.tables study 'make study STUDY="$(STUDY)"' $(OUT)/study/headline.csv
 
-accuracy: $(DEV)
-	$(BIN)/python -m tests.bench.accuracy $(if $(GRASPS),--grasps "$(GRASPS)")
-
 docs/touches.png docs/touches-dark.png: $(READY)
 	$(BIN)/python -m train show edge/demo/*.npz --model edge/demo/model.onnx \
 	  $(if $(findstring dark,$@),--dark) --out $@
@@ -199,9 +195,6 @@ transfer: $(BENCHVENV)
 	$(BIN)/python -m train simulate $(SCENE) --out $(HELD)/simulated
 	$(BIN)/python -m export --data $(HELD)/simulated --out $(HELD)/household $(EXPORT)
 	$(BIN)/python -m tests.bench.transfer --model $(HELD)/household/model.onnx $(TRANSFER)
-
-shear: $(DEV)
-	$(BIN)/python -m tests.bench.shear --out $(OUT)/shear $(SHEAR)
 
 ifndef DATA
 study tradeoff: $(SIMULATED)/.made
@@ -265,6 +258,9 @@ $(PEERS)/.ready: pyproject.toml constraints.txt
 	$(PEERS)/bin/$(PINNED) $(PEERS)/constraints.txt -e . --group peers
 	@touch $@
 
+accuracy: $(PEERS)/.ready
+	$(PEERS)/bin/python -m tests.bench.accuracy $(if $(GRASPS),--grasps "$(GRASPS)")
+
 peers-test: $(PEERS)/.ready
 	$(PEERS)/bin/python -m pytest tests/edge/touch/test_kernels.py -k aeon -rs
 
@@ -285,7 +281,7 @@ soak: $(DEV)
 
 # Every table of docs/measured, one target after another, with a line for each as it ends. The
 # tables that this writes are no local change.
-ONLY ?= accuracy bench hard-cases kills risk shear shifts soak stopping transfer \
+ONLY ?= accuracy bench hard-cases kills risk shifts soak stopping transfer \
   docs/tradeoff.png
 measured: $(DEV)
 	@test -z "`git status --porcelain -uno -- . ':!docs/measured' ':!docs/*.png'`" || \

@@ -37,6 +37,7 @@ from edge.files import parsing
 from edge.model.model import Model
 from edge.recording import Recording, load_arrays, load_meta
 from edge.touch.contact import FeatureSeries
+from edge.touch.feature import OF_CELLS
 from edge.touch.first_contact import first_contact
 from edge.touch.layout import SkinLayout
 
@@ -87,7 +88,7 @@ def first_series(
 
 def integers_of(series: FeatureSeries) -> Integers:
     """(n, m) all whole numbers: peak, area, sums, those of the zones, the cells."""
-    cells = [c for c in (series.taxels, series.kernel_cells) if c is not None]
+    cells = [c for c in map(vars(series).get, OF_CELLS) if c is not None]
     return np.column_stack(
         [series.peak, series.area, series.sums, *series.zones.values(), *cells]
     )

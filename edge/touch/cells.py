@@ -2,7 +2,9 @@
 apart."""
 
 import math
-from collections.abc import Collection
+from collections.abc import Callable, Collection
+from dataclasses import replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -50,11 +52,26 @@ class Cells:
         return np.asarray(np.add.reduceat(lines, self._cols, axis=1))
 
 
+class ShearCells(Cells):
+    """The same cells, and the tangential force on each."""
+
+    def read(self, frame: Frame) -> Integers:
+        """(2 * count,) sums of a frame's shear along the rows, then around the
+        columns."""
+        assert frame.shear is not None
+        along, around = np.moveaxis(frame.shear, 2, 0)
+        halves = [replace(frame, counts=along), replace(frame, counts=around)]
+        return np.concatenate(list(map(super().read, halves)))
+
+
+KINDS: dict[str, Callable[[SkinLayout], Cells]] = {
+    "taxel_force": Cells,
+    "taxel_shear": ShearCells,
+    "taxel_kernels": partial(Cells, most=KERNEL_CELLS),
+}
+"""{quantity: the cells that it needs}."""
+
+
 def cells_for(layout: SkinLayout, quantities: Collection[str]) -> dict[str, Cells]:
-    """{name in `edge.touch.contact.FeatureSeries`: the cells that quantities need}."""
-    cells = {}
-    if "taxel_force" in quantities:
-        cells["taxels"] = Cells(layout)
-    if "taxel_kernels" in quantities:
-        cells["kernel_cells"] = Cells(layout, KERNEL_CELLS)
-    return cells
+    """{quantity: its cells} of the quantities that need some."""
+    return {name: KINDS[name](layout) for name in KINDS if name in quantities}

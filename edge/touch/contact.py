@@ -15,7 +15,7 @@ from edge.arrays import Booleans, Counts, Floats, Integers
 from edge.elementary import length
 from edge.errors import InputError
 from edge.touch.active import ActiveTaxels, Region
-from edge.touch.feature import OF_PAPER, PAPER, Feature
+from edge.touch.feature import OF_CELLS, OF_PAPER, PAPER, Feature
 from edge.touch.frame import Frame
 from edge.touch.layout import SkinLayout
 
@@ -52,13 +52,15 @@ class FeatureSeries:
         layout: the skin, with its thresholds.
         ended: the contact ended with the last frame.
         speed: of the joints before onset, see `Contact`.
-        zones: {zone: (n, 8)} whole numbers of each zone, see `edge.touch.zones`; 12
+        zones: {zone: (n, 8)} whole numbers of each zone, see `edge.touch.zones`; 10
             with those of its shear.
         force_motion: (n,) as `motion`, of the force-weighted centroid, or None.
-        taxels: (n, cells) value of each cell of the skin (`edge.touch.cells.Cells`),
+        taxel_force: (n, cells) value of each cell of the skin (`edge.touch.cells.Cells`),
             or None.
-        kernel_cells: (n, cells) likewise, of the larger cells that kernels take, or
+        taxel_kernels: (n, cells) likewise, of the larger cells that kernels take, or
             None.
+        taxel_shear: (n, 2 * cells) likewise, of the shear of the same cells
+            (`edge.touch.cells.ShearCells`), or None.
         joints: (n, dof) joint angles in radians, NaN where they were not known, or
             None.
     """
@@ -75,8 +77,9 @@ class FeatureSeries:
     speed: float = math.nan
     zones: dict[str, Integers] = field(default_factory=dict)
     force_motion: Floats | None = None
-    taxels: Integers | None = None
-    kernel_cells: Integers | None = None
+    taxel_force: Integers | None = None
+    taxel_kernels: Integers | None = None
+    taxel_shear: Integers | None = None
     joints: Floats | None = None
 
     def felt(self, window_s: float) -> Self:
@@ -155,7 +158,7 @@ class Measurer:
             self.zones = Zones(layout, types)
         self.joints: JointAngles | None = None
         self.readers: dict[str, Cells | JointAngles] = {}
-        if not quantities.isdisjoint(("taxel_force", "taxel_kernels")):
+        if not quantities.isdisjoint(OF_CELLS):
             from edge.touch.cells import cells_for
 
             self.readers.update(cells_for(layout, quantities))

@@ -10,6 +10,10 @@ They are applied to the skin's cells, at most `edge.touch.cells.KERNEL_CELLS`, a
 the whole numbers of all zones."""
 
 
+OF_CELLS = {"taxel_force": 1, "taxel_shear": 2, "taxel_kernels": 0}
+"""Quantities that need the skin's cells, and their values of each cell in a frame."""
+
+
 @dataclass(frozen=True)
 class Feature:
     """A feature type.

@@ -14,7 +14,7 @@ import numpy as np
 from edge.arrays import Array, Floats
 from edge.errors import InputError
 from edge.touch.contact import FeatureSeries, feature_types
-from edge.touch.feature import PAPER, Feature, not_measured
+from edge.touch.feature import OF_CELLS, PAPER, Feature, not_measured
 from edge.touch.layout import SkinLayout
 
 if TYPE_CHECKING:
@@ -52,10 +52,10 @@ def widths(
             length = 1  # one number for the window
         if feature.of_joints:
             length *= joints
-        elif feature.quantity == "taxel_force":
+        elif feature.wide and not feature.kernels:
             from edge.touch.cells import Cells
 
-            length *= Cells(layout).count
+            length *= Cells(layout).count * OF_CELLS[feature.quantity]
         lengths.append(length)
     return tuple(lengths)
 
@@ -192,7 +192,7 @@ class _Course:
         sampled[complete] = _resample(times, t, values[complete])
         for i in np.flatnonzero(~complete & valid.any(axis=1)):
             sampled[i] = _resample(times, t[valid[i]], values[i, valid[i]])
-        if first.quantity == "taxel_force":
+        if first.quantity in OF_CELLS:
             return sampled / self._scale
         return sampled - sampled[:, :1] if first.quantity == "joint_change" else sampled
 
@@ -205,7 +205,8 @@ class _Course:
             ("contact", "motion"): series.motion,
             ("contact", "force_motion"): series.force_motion,
             ("contact", "area"): series.area,
-            ("skin", "taxel_force"): series.taxels,
+            ("skin", "taxel_force"): series.taxel_force,
+            ("skin", "taxel_shear"): series.taxel_shear,
             ("arm", "joint_angle"): series.joints,
             ("arm", "joint_change"): series.joints,
         }

@@ -15,11 +15,10 @@ zones that some feature needs are measured.
 
 import difflib
 import re
-from collections.abc import Sequence
 from functools import lru_cache
 
 from edge.errors import InputError
-from edge.touch.feature import KERNELS, PAPER, Feature
+from edge.touch.feature import KERNELS, OF_CELLS, PAPER, Feature
 
 ZONES = ("contact", "skin", "left", "right")
 QUANTITIES = tuple(
@@ -36,6 +35,7 @@ ALONE = {
     "force_motion": ("contact", "force_motion"),
     "stiffness": ("skin", "stiffness"),
     "taxel_force": ("skin", "taxel_force"),
+    "taxel_shear": ("skin", "taxel_shear"),
     "taxel_kernels": ("skin", "taxel_kernels"),
     "zone_kernels": ("skin", "zone_kernels"),
     "joint_change": ("arm", "joint_change"),
@@ -48,13 +48,15 @@ ZONES_OF = {
     "zone_kernels": ZONES,
 }
 """The zones of quantities that need others than their own, or more."""
-WIDE = ("taxel_force", *KERNELS, "joint_change", "joint_angle")
+WIDE = (*OF_CELLS, *KERNELS, "joint_change", "joint_angle")
 """Quantities of many values: one for each cell of the skin, kernel or
 joint."""
-SHEAR = ("shear_along", "shear_around", "shear_size", "shear_ratio", "twist")
+SHEAR = ("shear_along", "shear_around", "shear_size", "shear_ratio")
 """Quantities of a zone of a skin of three axes, see `edge.touch.shear`."""
+OF_SHEAR = (*SHEAR, "taxel_shear")
+"""All quantities of such a skin alone."""
 SIGNED = frozenset(
-    "around slant joint_change joint_angle shear_along shear_around twist".split()
+    "around slant joint_change joint_angle shear_along shear_around taxel_shear".split()
 )
 """Quantities that may be negative, and so have no logarithm."""
 
@@ -72,15 +74,11 @@ _NAME = re.compile(
 MOST_SAMPLES = 10_000
 
 
-def names(quantities: Sequence[str] = QUANTITIES) -> list[str]:
-    """All feature types without transforms and summaries, the paper's first.
-
-    Args:
-        quantities: of the zones; with those of `SHEAR` for a skin of three axes.
-    """
-    zones = [f"{zone}_{quantity}" for zone in ZONES for quantity in quantities]
+def names() -> list[str]:
+    """All feature types without transforms and summaries, the paper's first."""
+    zones = [f"{zone}_{name}" for zone in ZONES for name in QUANTITIES + SHEAR]
     unique = dict.fromkeys((*PAPER, *ALONE, *zones))
-    unique.pop("contact_max_force", None)
+    del unique["contact_max_force"]
     return list(unique)
 
 
@@ -149,7 +147,7 @@ def _zones(zone: str, quantity: str) -> tuple[str, ...]:
 
 
 def _no_feature(name: str, base: str) -> InputError:
-    types = names(QUANTITIES + SHEAR)
+    types = names()
     nearest = difflib.get_close_matches(base, types, 3) or types[:3]
     return InputError(
         f"there is no feature {name!r}; the nearest are {', '.join(nearest)}"

@@ -107,8 +107,8 @@ class ContactTracker:
             that ends with this frame is among them, with `ended` True.
 
         Raises:
-            InputError: the frame's shape is not the skin's, its time goes back, or a
-                time or joint angle is not finite.
+            InputError: the frame's shape is not the skin's, it lacks shear, its time
+                goes back, or a time or joint angle is not finite.
         """
         self.check(frame)
         return self.follow(frame, active_taxels(frame, self.layout))
@@ -200,6 +200,8 @@ class ContactTracker:
                 f"a frame of {frame.counts.shape} taxels on a skin of "
                 f"{self.layout.shape}"
             )
+        if self.layout.axes and frame.shear is None:
+            raise InputError("the features need shear, which a frame lacks")
         if not math.isfinite(frame.t):
             raise InputError(f"the time of a frame is not finite: {frame.t}")
         if math.ulp(frame.t) > CLOCK_ROUNDING_S:

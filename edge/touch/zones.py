@@ -80,8 +80,8 @@ class Zones:
             row += int(counts.max(initial=0)), int(np.count_nonzero(counts))
             row += force, rows, cols, rows_rows, rows_cols, cols_cols
             if self._shear_sums is not None:
-                turned = self._cols[cut, half, 1]
-                row += self._shear_sums(shear, mask, half, turned)
+                assert shear is not None
+                row += self._shear_sums(shear[:, half], mask[:, half])
         return row
 
     def split(self, rows: Integers) -> dict[str, Integers]:

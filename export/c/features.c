@@ -219,7 +219,7 @@ static void block(const ec_feature *feature, double window_s, double *out) {
   }
 }
 
-#define SAMPLES 40
+#define SAMPLES 120
 #define BITS 14
 
 /* A channel, held between frames, times a power of two and cut off. No sum of a skin that export
@@ -263,7 +263,8 @@ static void shares(const ec_kernels *kernels, double window_s, double *out) {
     while (frame + 1 < frames && felt[frame + 1]->t <= i * step_s + 1e-6) frame++;
     rows[i] = felt[frame];
   }
-  for (int32_t dilation = 1; dilation <= 4; dilation++) {
+  for (int32_t level = 0; level < 4; level++) {
+    int32_t dilation = 1 << level;
     uint8_t heavy[3] = {0, 1, 2};
     for (int32_t kernel = 0; kernel < 84; kernel++) {
       int32_t mixed[SAMPLES] = {0};
@@ -274,8 +275,8 @@ static void shares(const ec_kernels *kernels, double window_s, double *out) {
       }
       convolve(mixed, heavy, dilation, results);
       next_taps(heavy);
-      int32_t reach = (kernel + dilation) % 2 == 0 ? 4 * dilation : 0;
-      for (uint8_t i = 0; i < kernels->biases_of_dilation[dilation - 1]; i++, bias++) {
+      int32_t reach = (kernel + level) % 2 ? 4 * dilation : 0;
+      for (uint8_t i = 0; i < kernels->biases_of_dilation[level]; i++, bias++) {
         int32_t above = 0;
         for (int32_t s = reach; s < SAMPLES - reach; s++) above += results[s] > *bias;
         *out++ = (double)above / (SAMPLES - 2 * reach);

@@ -195,7 +195,7 @@ def spelled(rng):
     """Names of features of every kind, with transforms and summaries."""
     names = []
     for name in measures.names():
-        if name not in KERNELS:
+        if name not in KERNELS and "shear" not in name:
             signed = measures.feature(name).quantity in measures.SIGNED
             prefixes = ["", "sqrt_", "relative_"]
             prefixes += [] if signed else ["log_", "log_relative_", "sqrt_log_"]

@@ -56,7 +56,7 @@ OF_SKIN = (
     ("taxels",),
     ("sqrt_taxels",),
     ("kernels",),
-    ("taxels", "kernels"),
+    ("sqrt_taxels", "kernels"),
 )
 OF_JOINTS = (("joints",), ("joints", "posture"))
 """For known things, each of `OF_SKIN` is a candidate with each of these, and with shear
@@ -280,7 +280,7 @@ class Mode:
 def _beside_every_other(joints: bool, shear: bool) -> list[tuple[str, ...]]:
     """Each of `OF_SKIN` beside what else the recordings have."""
     of_joints = OF_JOINTS if joints else ((),)
-    of_shear = ((), ("shear",)) if shear else ((),)
+    of_shear = ((), ("shear", "taxel_shear")) if shear else ((),)
     return [
         (*skin, *tangential, *angles)
         for skin, tangential, angles in product(OF_SKIN, of_shear, of_joints)

@@ -74,15 +74,31 @@ of the normal one. It nears the coefficient of friction before a contact slides.
 | `log_contact_shear_size`, its rate | log(newton) | the sums of both components |
 | `contact_shear_ratio`, its rate | 1, 1/s | the same, over the sum of counts |
 | `sqrt_contact_shear_along`, `_around` | newton under the root | each of the sums |
-| `sqrt_contact_twist` | newton metre under the root | and their moments |
+
+`taxel_shear`: the tangential force on every taxel, or on cells of several as in
+`taxels`.
+
+| feature, of each cell | unit | from |
+|---|---|---|
+| `sqrt_taxel_shear`, at ten times | newton under the root | both of its sums of shear |
 """
 
 from collections.abc import Sequence
 
 from edge.touch.feature import KERNELS, PAPER, Feature
 from edge.touch.layout import SkinLayout
-from edge.touch.measures import QUANTITIES, SHEAR
+from edge.touch.measures import OF_SHEAR, QUANTITIES
 
+FORCES = (
+    "max_force",
+    "force",
+    "taxel_force",
+    "shear_along",
+    "shear_around",
+    "shear_size",
+    "taxel_shear",
+)
+"""Quantities in the unit of a force."""
 _TAXELS = (
     "taxel_force@10",
     "taxel_force_mean",
@@ -124,8 +140,8 @@ SETS: dict[str, tuple[str, ...]] = {
         "contact_shear_ratio_rate@5",
         "sqrt_contact_shear_along@5",
         "sqrt_contact_shear_around@5",
-        "sqrt_contact_twist@5",
     ),
+    "taxel_shear": ("sqrt_taxel_shear@10",),
 }
 """{set: names of its features, see `edge.touch.measures`}."""
 
@@ -144,25 +160,19 @@ def moves(feature: Feature) -> bool:
 
 def axes(types: Sequence[Feature]) -> int | None:
     """3 where a feature needs shear, else None, as `SkinLayout.axes` says it."""
-    return 3 if any(feature.quantity in SHEAR for feature in types) else None
+    return 3 if any(feature.quantity in OF_SHEAR for feature in types) else None
 
 
 def unit(feature: Feature, layout: SkinLayout) -> str:
     """The unit of a feature's values on a skin."""
     text = {
-        "max_force": layout.force_unit,
-        "force": layout.force_unit,
-        "taxel_force": layout.force_unit,
+        **dict.fromkeys(FORCES, layout.force_unit),
         "pressure": f"{layout.force_unit}/taxel",
         "motion": layout.length_unit,
         "force_motion": layout.length_unit,
         "stiffness": f"{layout.force_unit}/{layout.length_unit}",
         "slant": "taxel^2",
-        "shear_along": layout.force_unit,
-        "shear_around": layout.force_unit,
-        "shear_size": layout.force_unit,
         "shear_ratio": "1",
-        "twist": f"{layout.force_unit} {layout.length_unit}",
         "joint_change": "radian",
         "joint_angle": "radian",
         **dict.fromkeys(KERNELS, "1"),

@@ -11,7 +11,7 @@ import numpy as np
 
 from edge.touch.features import WINDOW_S
 from edge.touch.layout import SkinLayout
-from edge.touch.measures import SHEAR, feature
+from edge.touch.measures import OF_SHEAR, feature
 from train.choose.settings import Chosen
 from train.data.dataset import DataSet, Recordings
 from train.data.folds import finest, stratified_folds
@@ -113,7 +113,7 @@ def _fewer_taxels(raw: Recordings, layout: SkinLayout) -> Iterator[Change]:
 
 def without_shear(dataset: DataSet) -> DataSet:
     """The same trials without the features of shear."""
-    names = [name for name in dataset.names if feature(name).quantity not in SHEAR]
+    names = [name for name in dataset.names if feature(name).quantity not in OF_SHEAR]
     return dataset.of(names)
 
 

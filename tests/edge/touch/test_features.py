@@ -160,7 +160,7 @@ from edge.touch.features import feature_vector
 from edge.touch.first_contact import first_contact
 from edge.touch.track import ContactTracker
 
-names = [name for name in measures.names() if "kernels" not in name]
+names = [n for n in measures.names() if "kernels" not in n and "shear" not in n]
 logs = [n for n in names if measures.feature(n).quantity not in measures.SIGNED]
 names += [f"log_{name}" for name in logs]
 names += [f"sqrt_{name}_deviation" for name in logs]

@@ -52,13 +52,13 @@ def by_hand(channels, table):
     convolutions = convolution_of_bias(len(table.biases)).tolist()
     counts = []
     for bias, convolution in zip(table.biases, convolutions, strict=True):
-        dilation, kernel = divmod(convolution, 84)
+        level, kernel = divmod(convolution, 84)
         mixed = list(map(sum, zip(*compress(rows, mixes[convolution]), strict=True)))
-        padded = (dilation + kernel) % 2 == 0
-        reach = 0 if padded else 4 * (dilation + 1)
+        padded = (level + kernel) % 2 == 0
+        reach = 0 if padded else 4 << level
         above = 0
         for t in range(reach, SAMPLES - reach):
-            above += result(mixed, kernel, dilation + 1, t) > bias
+            above += result(mixed, kernel, 1 << level, t) > bias
         counts.append((above, SAMPLES - 2 * reach))
     return counts
 
@@ -117,15 +117,15 @@ def test_a_convolution_takes_the_same_channels_on_every_machine():
 
 
 def touch():
-    """A press that grows; its frames come 40 ms apart and a little late."""
+    """A press that grows; its frames come 10 ms apart and a little late."""
     patch = {(row, (3, 4, 5)) for row in (2, 3, 4)}
     return [
         pressed(
             SKIN,
-            5.0 + 0.04 * i + 1e-9 * (i % 3),
+            5.0 + 0.01 * i + 1e-9 * (i % 3),
             dict.fromkeys(patch, 10 + 7 * i % 50),
         )
-        for i in range(40)
+        for i in range(SAMPLES)
     ]
 
 
@@ -138,9 +138,9 @@ def series_of(frames, *features):
 )
 def test_a_channel_holds_the_last_frame_before_each_time(name, channels):
     frames = touch()
-    held = kernel_channels(series_of(frames, name), 1.56, name)
+    held = kernel_channels(series_of(frames, name), 1.19, name)
     assert held.shape == (channels, SAMPLES) == (channels_of(name, SKIN), SAMPLES)
-    # Frame i is 0.04 s i after the onset, at which sample i is mixes.
+    # Frame i is 0.01 s i after the onset, at which sample i is mixes.
     forces = [int(frame.counts.sum()) for frame in frames]
     sums = held.sum(axis=0) if name == "taxel_kernels" else held[10]
     assert sums.tolist() == forces
@@ -149,7 +149,7 @@ def test_a_channel_holds_the_last_frame_before_each_time(name, channels):
     )
     vector = feature_vector(
         series_of(frames, name),
-        1.56,
+        1.19,
         features=[name],
         tables={name: table},
     )

@@ -13,7 +13,6 @@ from edge.errors import InputError
 from edge.touch import shear
 from edge.touch.features import feature_vector
 from edge.touch.frame import Frame
-from edge.touch.grid import best_cut
 from edge.touch.layout import SkinLayout
 from edge.touch.measures import SHEAR, ZONES
 from edge.touch.zones import ZONE_WIDTH
@@ -46,14 +45,10 @@ def plain_sums(layout, frame, zone) -> list[int]:
     mask = active.largest().mask if zone == "contact" else active.mask
     half = layout.cols // 2
     sides = {"left": range(half), "right": range(half, layout.cols)}
-    weights = (frame.counts * mask).sum(axis=0, dtype=int).tolist()
-    cut = best_cut(weights) if layout.wraps and zone not in sides else 0
-    sums = np.zeros(4, dtype=int)
+    sums = np.zeros(2, dtype=int)
     for row, col in np.argwhere(mask).tolist():
         if col in sides.get(zone, range(layout.cols)):
-            along, around = frame.shear[row, col].tolist()
-            place = col + layout.cols * (col < cut)
-            sums += along, around, row * around, place * along
+            sums += frame.shear[row, col]
     return sums.tolist()
 
 
@@ -73,39 +68,9 @@ def test_sums_are_those_of_plain_loops(seed, wraps, shape):
         assert zones[zone][ZONE_WIDTH:] == plain_sums(layout, frame, zone)
 
 
-def test_a_contact_moved_across_the_seam_keeps_its_twist():
-    layout = replace(LAYOUT, wraps=True)
-    frame = sheared_frame(8, LAYOUT.shape)
-    frame.counts[:, 4:] = 0
-    twists = []
-    for step in range(7):
-        rolled = Frame(
-            0.0,
-            np.roll(frame.counts, step, 1),
-            np.roll(frame.valid, step, 1),
-            shear=np.roll(frame.shear, step, 1),
-        )
-        twists.append(skin_quantities(layout, rolled)["twist"])
-    assert twists == pytest.approx(twists[:1] * 7, rel=1e-12)
-
-
 def quantities_of(row: list[int]) -> dict[str, float]:
     values = shear.quantities(np.array([row]), LAYOUT)
     return {name: float(value[0]) for name, value in values.items()}
-
-
-def skin_quantities(layout, frame) -> dict[str, float]:
-    return quantities_of(zones_of(layout, frame, ALL)["skin"])
-
-
-def twist_of(row, pitch):
-    """The twist in counts times metres, and the size of its two parts, from a zone's
-    whole numbers."""
-    _, _, force, rows, cols, *_ = row
-    along, around, rows_around, cols_along = row[ZONE_WIDTH:]
-    first = (rows_around - Fraction(rows, force) * around) * Fraction(pitch[0])
-    second = (cols_along - Fraction(cols, force) * along) * Fraction(pitch[1])
-    return first - second, abs(first) + abs(second)
 
 
 @settings(max_examples=60)
@@ -116,7 +81,7 @@ def test_quantities_are_those_of_fractions(seed):
         return
     row = zones_of(LAYOUT, frame, ALL)["skin"]
     force = row[2]
-    along, around, *_ = row[ZONE_WIDTH:]
+    along, around = row[ZONE_WIDTH:]
     quantities = quantities_of(row)
     assert quantities["shear_along"] == along / 100.0
     assert quantities["shear_around"] == around / 100.0
@@ -127,8 +92,6 @@ def test_quantities_are_those_of_fractions(seed):
     assert quantities["shear_ratio"] == pytest.approx(
         float(size) ** 0.5 / force, rel=1e-15
     )
-    twist, size = twist_of(row, LAYOUT.pitch)
-    assert abs(quantities["twist"] - float(twist / 100)) <= 1e-15 * float(size / 100)
 
 
 def test_an_empty_zone_has_no_shear():
@@ -141,20 +104,8 @@ def test_the_largest_skin_full_of_the_largest_shear_does_not_overflow(wraps):
     layout = SkinLayout(side, side, wraps=wraps, axes=3)
     tangential = np.full((side, side, 2), -32768, dtype=np.int16)
     frame = Frame(0.0, np.full((side, side), 65535, np.uint16), shear=tangential)
-    row = zones_of(layout, frame, ["skin_twist"])["skin"]
-    line = side * sum(range(side))
-    assert row[ZONE_WIDTH:] == [
-        -32768 * v for v in (side * side, side * side, line, line)
-    ]
-    # An even field has no moment about its centroid.
-    assert shear.quantities(np.array([row]), layout)["twist"].tolist() == [0.0]
-
-
-def test_a_moment_beyond_64_bits_is_exact():
-    """2^32 times 2^32, and as much again."""
-    large = 2**32
-    row = [0, 1, large, large, 0, 0, 0, 0, 0, -large, large, 0]
-    assert quantities_of(row)["twist"] == 2.0 * large * 0.01 / 100.0
+    row = zones_of(layout, frame, ["skin_shear_size"])["skin"]
+    assert row[ZONE_WIDTH:] == [-32768 * side * side] * 2
 
 
 def test_features_follow_the_shear_of_a_contact():
@@ -174,7 +125,16 @@ def test_features_follow_the_shear_of_a_contact():
     assert vector[6:] == pytest.approx([0.0, 0.4, 0.8], rel=1e-15)
 
 
+def test_the_shear_of_a_taxel_is_kept_apart_by_place_and_axis():
+    frames = [sheared_frame(seed, LAYOUT.shape, t=0.5 * seed) for seed in range(3)]
+    series = followed(LAYOUT, frames, features=["taxel_shear"]).series()
+    vector = feature_vector(series, 1.0, 3, ["sqrt_taxel_shear"])
+    known = [(f.shear * f.valid[..., None] / 100.0).reshape(-1, 2) for f in frames]
+    expected = np.transpose(known, (2, 1, 0)).reshape(-1)
+    assert (np.sign(vector) * vector**2).tolist() == pytest.approx(expected, rel=1e-15)
+
+
 def test_a_frame_without_shear_is_named():
     frame = replace(sheared_frame(1, LAYOUT.shape), shear=None)
     with pytest.raises(InputError, match="need shear, which a frame lacks"):
-        zones_of(LAYOUT, frame, ALL)
+        followed(LAYOUT, [frame], features=["taxel_shear"])

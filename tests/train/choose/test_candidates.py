@@ -70,7 +70,7 @@ def test_features_of_shear_are_candidates_where_recordings_have_it():
 
 def test_each_group_of_features_is_tried_beside_every_other_for_known_things():
     known = sets_of(known=True, joints=True, shear=True)
-    assert ("taxels", "shear", "joints", "posture") in known
+    assert ("taxels", "shear", "taxel_shear", "joints", "posture") in known
     assert ("kernels", "joints", "posture") in known
     assert known.isdisjoint(sets_of(joints=True, shear=True))
     assert not sets_of(known=True, joints=True, quick=True)

@@ -74,7 +74,7 @@ def test_units_are_those_of_the_skin():
         "sqrt_relative_taxel_force_rate": "sqrt(1)/s",
         "log_skin_force_mean": "log(newton)",
         "joint_change_rate@10": "radian/s",
-        "sqrt_contact_twist": "sqrt(newton metre)",
+        "sqrt_taxel_shear": "sqrt(newton)",
         "contact_shear_ratio_rate": "1/s",
         "log_skin_shear_size": "log(newton)",
     }
