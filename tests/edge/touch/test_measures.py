@@ -154,11 +154,9 @@ def moments(taxels):
 def test_moments_are_those_of_exact_arithmetic(seed, density):
     counts = frame_of(seed, FLAT.shape, density).counts.astype(int)
     counts[2, 3] = 40000
-    taxels = [
-        (*taxel, counts[*taxel].item()) for taxel in np.argwhere(counts > 10).tolist()
-    ]
-    exact = moments(taxels)
-    exact["force"] = sum(f for _, _, f in taxels) / 100
+    above = counts > 10
+    exact = moments(np.c_[np.argwhere(above), counts[above]].tolist())
+    exact["force"] = counts[above].sum() / 100
     # The determinant of a thin contact cancels: see `edge.touch.features`.
     width = pytest.approx(float(exact.pop("width")), abs=7 * 2.0**-25)
     assert value(FLAT, counts, "skin_width") == width
