@@ -10,7 +10,7 @@ PIP := $(BIN)/$(PINNED) constraints.txt
 export OPENBLAS_NUM_THREADS := 1
 
 .PHONY: help venv test test-all test-busy lint types export demo demo-data golden study tradeoff wheel wheel-test \
-  board-test browser-test c-test kernel-test peers-test service-test hard-cases hard-cases-versions mutants fuzz kills accuracy bench transfer docs faults risk shifts \
+  board-test browser-test c-test kernel-test peers-test service-test hard-cases hard-cases-versions mutants fuzz kills accuracy bench transfer remount docs faults risk shifts \
   stopping soak measured constraints clean
 
 help:
@@ -267,7 +267,6 @@ peers-test: $(PEERS)/.ready
 stopping: $(DEV)
 	$(BIN)/python -m tests.bench.stopping --data $(STOPPED) $(STOPPING)
 
-.PHONY: remount
 # REMOUNT="icub sdh2": folders of imported grasps.
 remount: $(DEV)
 	$(BIN)/python -m tests.remount --recordings $(REMOUNT)
