@@ -97,7 +97,13 @@ def passed_on(values: Mapping[str, float], skin: Cylinder) -> float:
     its elastic layer (`effects.foundation`) `PRESSED_M` deep; infinite for other
     objects."""
     if "stem_n_m" in values:
-        return values["stem_count"] * values["stem_n_m"] * PRESSED_M
+        stems = round(values["stem_count"])
+        depths = np.linspace(0.0, values["stem_spread_m"], stems)
+        bends = float(np.maximum(PRESSED_M - depths, 0.0).sum())
+        if "stem_height_m" in values:
+            # Of stems that stand upright the forearm meets those within its radius.
+            bends *= min(2.0 * skin.radius_m / values["breadth_m"], 1.0)
+        return bends * values["stem_n_m"]
     if "modulus_pa" in values:
         length = min(values["width_m"], skin.rows * skin.pitch[0])
         half_width = math.sqrt(2.0 * skin.radius_m * PRESSED_M)

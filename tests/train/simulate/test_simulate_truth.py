@@ -113,19 +113,19 @@ class TestFamilies:
         [
             {},
             {"family": "foam", "friction_static": [0.3, 1.0], "skin_friction": 0.9},
-            {"family": "foliage", "stem_count": [5, 30], "stem_n_m": [1.0, 50.0]},
-            {"family": "foliage", "stem_count": 3},
+            {"family": "foliage", "stem_height_m": 0.5, "breadth_m": [0.1, 0.5]},
         ],
     )
     def test_no_object_holds_more_than_can_be_pushed(self, keys):
         """The skin's shear makes an object harder to move; stems push no more than they
-        bear."""
+        bear, and if they stand upright, those beside the forearm nothing."""
         for o in scene(families=[{**FAMILY, **keys, "count": 40}]).objects:
             value = {name: number.low for name, number in o.values.items()}
             mu = value["friction_static"]
             most = 6.0 * (1.0 - value.get("skin_friction", 0.0) * mu)
             if o.family == "foliage":
-                most = min(most, value["stem_count"] * value["stem_n_m"] * 0.06)
+                met = value["stem_count"] * 0.0921 / value["breadth_m"]
+                most = min(most, met * value["stem_n_m"] * 0.06)
             assert mu * value["mass_kg"] * 9.80665 <= most
 
     def test_the_draws_are_the_familys_own(self):
