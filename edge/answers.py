@@ -73,7 +73,7 @@ def contact_doubts(
     series: FeatureSeries,
     window_s: float,
 ) -> dict[str, bool]:
-    """{flag: whether it holds} for what was measured of a contact, see `edge.flags`."""
+    """{flag: whether it holds} for a measured contact, see `edge.flags`."""
     doubts = frame_doubts(series, window_s)
     if info.joints:
         from edge.touch.joint_doubts import joint_doubts  # not every model has joints

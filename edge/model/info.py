@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from edge.touch.kernels import KernelTable
 
 METADATA_KEY = "edge-classify"
-FORMAT = 8
+FORMAT = 9
 
 
 @dataclass(frozen=True)

@@ -123,7 +123,7 @@ class Trials:
     def push(self, frame: Frame) -> list[Frame] | None:
         """Take in a frame; returns the frames of a trial that this frame completes."""
         contact = next(iter(self._tracker.push(frame)), None)
-        frame = self._tracker.seen or frame
+        frame = self._tracker.latest or frame
         if self._frames is not None:
             self._frames.append(frame)
         else:

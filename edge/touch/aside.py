@@ -84,7 +84,7 @@ class AsideTaxels:
         longest_s = horizon_s if math.isfinite(horizon_s) else 0.0
         zeros = np.zeros(layout.shape, dtype=np.int64)
         self.aside = zeros > 0
-        self.seen = frame
+        self.latest = frame
         self._tracker = tracker
         self._layout = layout
         self._grid = grid(layout.rows, layout.cols, layout.wraps)
@@ -127,7 +127,7 @@ class AsideTaxels:
     def follow(self, frame: Frame, active: ActiveTaxels) -> list[Contact]:
         """As `ContactTracker.follow`, without what is set aside."""
         former = self._hidden
-        self.seen = frame
+        self.latest = frame
         self._watch(frame, active)
         shown = self._beside(frame)
         beside = active_taxels(shown, self._layout)
@@ -149,7 +149,7 @@ class AsideTaxels:
         contacts = over + self._tracker.follow(shown, beside)
         self._keep_early(frame, active, contacts)
         if not is_early:
-            self.seen = shown
+            self.latest = shown
         return contacts
 
     def finish(self) -> list[Contact]:

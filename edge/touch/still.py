@@ -35,7 +35,7 @@ class WatchfulTracker:
     def __init__(self, tracker: ContactTracker) -> None:
         """Watch over a fresh tracker."""
         self.tracker = tracker
-        self.seen: Frame | None = None
+        self.latest: Frame | None = None
         self._none = np.zeros(tracker.layout.shape, dtype=np.bool_)
         self._begun_s = np.full(tracker.layout.shape, np.inf)
         """When each taxel was first active, since none was for `release_s`."""
@@ -61,15 +61,15 @@ class WatchfulTracker:
             from edge.touch.aside import AsideTaxels  # most contacts are touches
 
             self._taxels = AsideTaxels(self.tracker, frame, self._begun_s)
-        is_first = self.seen is None
-        self.seen = frame
+        is_first = self.latest is None
+        self.latest = frame
         if self._taxels is None:
             contacts = self.tracker.follow(frame, active)
             for contact in self.tracker.contacts if is_first else ():
                 contact.late = True
             return contacts
         contacts = self._taxels.follow(frame, active)
-        self.seen = self._taxels.seen
+        self.latest = self._taxels.latest
         return contacts
 
     def _may_be_none(self, frame: Frame, active: ActiveTaxels) -> bool:
@@ -83,7 +83,7 @@ class WatchfulTracker:
             return False
         self._active_s = frame.t
         np.minimum(self._begun_s, frame.t, out=self._begun_s, where=active.mask)
-        if self.seen is None:
+        if self.latest is None:
             readable = True if frame.valid is None else frame.valid
             return bool((active.mask != readable).any())
         return frame.t - float(self._begun_s.min()) >= LASTING_S

@@ -119,7 +119,9 @@ void ec_zone(
   uint32_t cut = 0;
   if (EC_WRAPS && (zone == EC_CONTACT || zone == EC_SKIN)) {
     int64_t weights[EC_COLS] = {0};
-    for (uint32_t i = 0; i < TAXELS; i++) weights[i % EC_COLS] += !taxels[i] ? 0 : counts ? counts[i] : 1;
+    for (uint32_t i = 0; i < TAXELS; i++) {
+      if (taxels[i]) weights[i % EC_COLS] += counts ? counts[i] : 1;
+    }
     cut = best_cut(weights);
   }
   for (uint32_t i = 0; i < EC_ZONE_WIDTH; i++) numbers[i] = 0;

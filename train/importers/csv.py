@@ -147,7 +147,8 @@ def _announced(
     skin: ConfigTable,
     options: TableOptions,
 ) -> tuple[int, int]:
-    """The rows and columns of the skin; prints the columns used and ignored, once for all files."""
+    """The rows and columns of the skin; prints the columns used and ignored, once for
+    all files."""
     first = usable[0]
     taxels = len(first.meaning.taxels)
     in_skin = skin.whole("rows", 1), skin.whole("cols", taxels)

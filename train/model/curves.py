@@ -74,7 +74,8 @@ class Curve:
         """The curve with the intercept at which the mean probability is the share of
         honest answers that are right, but for what is `WITHHELD`, and within half an
         answer of the possible."""
-        margins, excess = evidence.margins, evidence.excess
+        margins = evidence.margins
+        excess = evidence.excess
         half_an_answer = 0.5 / margins.size
         known = evidence.mean(evidence.known)
         share = evidence.mean(evidence.honest) * (1.0 - WITHHELD * (1.0 - known))

@@ -307,16 +307,16 @@ def check_energy(batch: Batch, joints: Array, times: Array) -> None:
         np.pad(np.add.accumulate(energy, axis=1), ((0, 0), (1, 0)))
         for energy in (put_in, np.abs(put_in), turned.sum(axis=2))
     )
-    held = stored + lost
-    brought = stored[:, :1] + moving[:, None] + work
-    gains = ~(held <= brought + ENERGY_MADE * both_ways + 1e-9)
+    energy_out = stored + lost
+    energy_in = stored[:, :1] + moving[:, None] + work
+    gains = ~(energy_out <= energy_in + ENERGY_MADE * both_ways + 1e-9)
     if gains.any():
         i = int(np.argmax(gains.any(axis=1)))
         frame = int(np.argmax(gains[i]))
         raise EdgeError(
             f"{scene.name}: trial {batch.specs[i].number} of {batch.specs[i].key} "
             f"makes energy: at {times[frame]:g} s the arm has stored or lost "
-            f"{held[i, frame]:.3g} J of the {brought[i, frame]:.3g} J put in; give "
+            f"{energy_out[i, frame]:.3g} J of the {energy_in[i, frame]:.3g} J put in; give "
             "[step_s] a smaller step, or the object less extreme values"
         )
 

@@ -64,7 +64,7 @@ def test_a_touch_that_may_be_under_way_is_seen_whole():
     tracker = watchful(1.0)
     for i, count in enumerate((100, 110, 300, 310)):
         tracker.push(pressed(LAYOUT, i * PERIOD_S, {(3, 3): count}))
-        assert tracker.seen.counts[3, 3] == count
+        assert tracker.latest.counts[3, 3] == count
 
 
 def test_what_never_changes_is_a_late_contact_where_there_is_no_other():
@@ -119,7 +119,7 @@ def test_more_than_the_threshold_and_a_quarter_of_the_level_is_a_touch(
     tracker = watchful(1.0)
     for t, count in ((0.0, level), (1.0, level), (1.1, level + change)):
         tracker.push(pressed(LAYOUT, t, {(1, 1): count}))
-    assert tracker.seen.counts[1, 1] == felt
+    assert tracker.latest.counts[1, 1] == felt
 
 
 def test_a_touch_of_what_is_set_aside_is_followed_without_its_level():

@@ -1,4 +1,4 @@
-"""Cells as numbers: what is none is named with its place."""
+"""Cells as numbers; one that is no number is named with its place."""
 
 import pytest
 

@@ -76,9 +76,9 @@ def predict(t: Trials) -> None:
     force, moment = t.contact.loads
     jacobian = shear.jacobian
     coupled = shear.coupled
-    drawn = total(jacobian * (q_free - q)) - coupled[0] * force - coupled[1] * moment
+    advance = total(jacobian * (q_free - q)) - coupled[0] * force - coupled[1] * moment
     k = stiffness(t)
-    stuck = k * (shear.stretch + drawn) / (1.0 + k * shear.give)
+    stuck = k * (shear.stretch + advance) / (1.0 + k * shear.give)
     pull = np.clip(stuck, *bounds(t))
     shear.before = q
     t.contact.pull = pull
