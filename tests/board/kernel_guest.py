@@ -96,9 +96,10 @@ class Rig:
         rows, cols = file.layout.shape
         self.touch = np.zeros((30, rows, cols), np.uint16)
         # The last frames are equal, as Ctrl-C may come a frame earlier or later. The
-        # others differ, as what stays still in the slow guest's time is set aside.
+        # others differ, as what stays still in the slow guest's time is set aside. The
+        # touch is so firm that its labels are the same however slow that time is.
         steps = np.arange(20, dtype=np.uint16).clip(max=15)
-        rising = 2 * file.layout.onset + steps * file.layout.onset // 5
+        rising = (30 + steps) * file.layout.onset
         self.touch[6:26, 1:4, cols - 4 : cols - 1] = rising[:, None, None]
 
     def record(self, frames):
