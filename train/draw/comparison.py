@@ -32,11 +32,8 @@ MOST = 6
 TITLES = "largest force", "area", "moved"
 GAMMA = 0.4
 """Exponent of the colour scale, so that soft touches are seen beside hard ones."""
-INKS = {False: ["#1f4e79", "#b03a2e"], True: ["#79b8ff", "#ff9080"]}
-"""Colours of curves and decisions, on a light page and on a dark one."""
-DARK = dict.fromkeys(
-    ("figure.facecolor", "axes.facecolor", "savefig.facecolor"), "#0d1117"
-)
+INKS = "#1f4e79", "#b03a2e"
+"""Colours of curves and decisions."""
 
 
 def draw(
@@ -44,7 +41,6 @@ def draw(
     out: Path,
     *,
     model: Model | None = None,
-    dark: bool = False,
 ) -> None:
     """Draw up to six touches into a PNG, a column each.
 
@@ -52,7 +48,6 @@ def draw(
         recordings: names, for errors, and recordings of one skin.
         out: the picture.
         model: whose decisions are shown.
-        dark: light lines on a dark background.
 
     Raises:
         InputError: there are too many, one has no contact or does not suit the model,
@@ -65,10 +60,9 @@ def draw(
     inks: dict[str, Any] = {
         **PLAIN_TEXT,
         "font.size": 12,
-        "axes.prop_cycle": cycler(color=INKS[dark]),
+        "axes.prop_cycle": cycler(color=INKS),
     }
-    page: list[Any] = ["dark_background", DARK, inks] if dark else [inks]
-    with style.context(page):
+    with style.context(inks):
         _draw(recordings, out, model)
 
 

@@ -20,7 +20,7 @@ from sklearn.utils.validation import check_is_fitted
 from edge.arrays import Booleans, Floats, Integers
 from edge.errors import InputError
 from edge.touch.features import FEATURES
-from train.model.scaling import centred_and_scaled, column_means
+from train.model.scaling import Scale, column_means
 
 FEATURE_BITS = 22
 """Bits of the largest scaled difference from the mean in training."""
@@ -334,10 +334,10 @@ class Projection(TransformerMixin, BaseEstimator):
     """A few whole-number coordinates of feature vectors, the same bits on every
     machine.
 
-    Each column's mean is subtracted, and the difference is multiplied by its feature
-    type's gain, rounded to 22 bits and multiplied by weights of at most 24 bits. The
-    sums are exact, and are rounded to 22 bits (`Grid`, `on_grid`). The directions are
-    principal components, or the discriminants of the labels (`Spectrum.discriminants`).
+    The vectors are centred and scaled (`train.model.scaling.Scale`), rounded to 22 bits
+    and multiplied by weights of at most 24 bits. The sums are exact, and are rounded to
+    22 bits (`Grid`, `on_grid`). The directions are principal components, or the
+    discriminants of the labels (`Spectrum.discriminants`).
 
     Two vectors that differ by less than a step, about 1e-6 of a deviation, may get the
     same coordinates. A vector far outside the training set's reach is clipped.
@@ -352,8 +352,7 @@ class Projection(TransformerMixin, BaseEstimator):
         widths: columns of each feature type; None if equal.
 
     Attributes:
-        mean_: (p,) is subtracted first.
-        gain_: (p,) multiplies the differences.
+        scale_: of the vectors.
         grid_: the steps of features and coordinates.
         weights_: (p, c), from `on_grid`.
         rank_: the largest possible number of coordinates.
@@ -388,12 +387,8 @@ class Projection(TransformerMixin, BaseEstimator):
         """
         X = np.asarray(X, dtype=np.float64)
         self.n_features_in_ = X.shape[1]
-        self.mean_, self.gain_, d = centred_and_scaled(
-            X,
-            self.scaling,
-            self.features,
-            self.widths,
-        )
+        self.scale_ = Scale.of(X, self.scaling, self.features, self.widths)
+        d = self.scale_.scaled(X)
         axes, self.gap_ = self._axes(d, y)
         self.rank_ = axes.shape[1]
         self.weights_ = on_grid(axes[:, : self.components])
@@ -425,5 +420,5 @@ class Projection(TransformerMixin, BaseEstimator):
     def transform(self, X: Floats) -> Floats:
         """Coordinates (n, c), multiples of `grid_.unit`, of vectors (n, p)."""
         check_is_fitted(self)
-        d = (np.asarray(X, dtype=np.float64) - self.mean_) * self.gain_
+        d = self.scale_.scaled(np.asarray(X, dtype=np.float64))
         return self.grid_.project(d, self.weights_)

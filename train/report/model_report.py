@@ -156,13 +156,14 @@ def _space(fitted: FittedTask, labels: Integers) -> Space:
     grid = projection.grid_
     return Space(
         columns=fitted.space.columns,
-        mean=projection.mean_,
-        gain=projection.gain_,
+        mean=projection.scale_.mean,
+        gain=projection.scale_.gain,
         weights=projection.weights_[:, : fitted.components],
         rows=fitted.rows,
         labels=labels,
         reach=MOST_STEPS * grid.step,
         limit=grid.limit * grid.unit,
+        bend=float(projection.scale_.bounded),
     )
 
 
