@@ -169,8 +169,9 @@ docs/measured/study.md: STUDY := --seeds 8
 docs/measured/study.md: study
 	$(BIN)/python -m tests.bench.tables study 'make study STUDY="$(STUDY)"' $(OUT)/study/headline.csv
 
-docs/touches.png: $(READY)
-	$(BIN)/python -m train show edge/demo/*.npz --model edge/demo/model.onnx --out $@
+docs/touches.png docs/touches-dark.png: $(READY)
+	$(BIN)/python -m train show edge/demo/*.npz --model edge/demo/model.onnx \
+	  $(if $(findstring dark,$@),--dark) --out $@
 
 docs/touch.png: $(READY)
 	$(BIN)/python -m train simulate train/scenes/demo.toml --out $(OUT)/picture --seed 2012 --trials 1

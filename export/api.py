@@ -28,8 +28,6 @@ from train.fitting import Fitted
 from train.model.pipeline import ContactClassifier
 from train.report.summary import names
 
-PACKAGES = ("numpy", "scikit-learn", "skl2onnx", "onnx")
-"""Whose versions a model names."""
 CALLS = 60
 """Decisions of which each candidate's time is the median."""
 MOST_NAMES = 50_000
@@ -82,15 +80,7 @@ def describe(fitted: Fitted, name: str | None = None) -> ModelInfo:
     """
     dataset = fitted.dataset
     folder, trials = names(dataset)
-    sequential = fitted.sequential
-    calibration: dict[str, Any] = {}
-    if sequential is not None:
-        calibration = {
-            "decision_points_s": tuple(sequential.decision_points_s),
-            "stopping": sequential.stopping_,
-            "novelty": sequential.novelty_,
-            "usual": usual_ranges(dataset, fitted.window_s, fitted.samples),
-        }
+    packages = ("numpy", "scikit-learn", "skl2onnx", "onnx")
     return ModelInfo(
         tasks={task: _task(fitted, task) for task in fitted.classifier.choices},
         layout=dataset.layout,
@@ -108,13 +98,26 @@ def describe(fitted: Fitted, name: str | None = None) -> ModelInfo:
         versions={
             "edge-classify": __version__,
             "python": platform.python_version(),
-            **{name: version(name) for name in PACKAGES},
+            **{package: version(package) for package in packages},
         },
         **usual_touches(dataset, list(fitted.classifier.choices), fitted.window_s),
         name=folder if name is None else name,
         trials=trials if sum(map(len, trials)) <= MOST_NAMES else (),
-        **calibration,
+        **_calibration(fitted),
     )
+
+
+def _calibration(fitted: Fitted) -> dict[str, Any]:
+    """What the metadata say of decision points, where the model has them."""
+    sequential = fitted.sequential
+    if sequential is None:
+        return {}
+    return {
+        "decision_points_s": tuple(sequential.decision_points_s),
+        "stopping": sequential.stopping_,
+        "novelty": sequential.novelty_,
+        "usual": usual_ranges(fitted.dataset, fitted.window_s, fitted.samples),
+    }
 
 
 def _task(fitted: Fitted, task: str) -> Task:

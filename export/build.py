@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Iterable, Sequence
-from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -176,15 +175,10 @@ def product(
         Names of the whole products (n, components) in the grid's units, and of how much
         was cut off from features to get them, as in `project`.
     """
-    means = build.by_decision_point([p.scale_.mean for p in decision_points])
+    means = build.by_decision_point([p.mean_ for p in decision_points])
     centred = build.node("Sub", x, means)
-    gains = [p.scale_.gain / p.grid_.step for p in decision_points]
+    gains = [p.gain_ / p.grid_.step for p in decision_points]
     scaled = build.node("Mul", centred, build.by_decision_point(gains))
-    bends = [p.grid_.step * p.scale_.bounded for p in decision_points]
-    if any(bends):
-        size = build.node("Max", scaled, build.node("Mul", scaled, -1.0))
-        growth = build.node("Mul", size, build.by_decision_point(bends))
-        scaled = build.node("Div", scaled, build.node("Add", growth, 1.0))
     steps, far = build.clipped(build.node("Round", scaled), [MOST_STEPS])
     # A step over a unit is a power of two, so that the products' sums are still exact.
     weights = [p.weights_ * (p.grid_.step / p.grid_.unit) for p in decision_points]
@@ -239,11 +233,17 @@ def project(
 
 def changes(arrays: Sequence[Integers]) -> list[int]:
     """Where arrays differ from the one before; the first counts."""
-    pairs = enumerate(pairwise(arrays), 1)
-    return [0, *(i for i, (a, b) in pairs if not np.array_equal(a, b))]
+    places = [0]
+    for i in range(1, len(arrays)):
+        if not np.array_equal(arrays[i], arrays[i - 1]):
+            places.append(i)
+    return places
 
 
 def widened(arrays: Sequence[Floats], width: int) -> list[Floats]:
     """Arrays with columns of zeros added up to a width, for coordinates that are always
     0."""
-    return [np.pad(array, ((0, 0), (0, width - array.shape[1]))) for array in arrays]
+    return [
+        np.pad(array, [(0, 0)] * (array.ndim - 1) + [(0, width - array.shape[-1])])
+        for array in arrays
+    ]

@@ -143,7 +143,8 @@ class CompiledGraph:
         size = prod(self._shape(node.outputs[0]))
         if operator in ELEMENT_WISE:
             counts = [prod(self._shape(name)) for name in self._inputs(node)]
-            if not {1, size}.issuperset(counts):
+            is_long = operator == "Max" and len(counts) > 2
+            if is_long or not {1, size}.issuperset(counts):
                 raise InputError(f"C cannot combine {counts} numbers; export it again")
             return [size, *counts]
         shape = self._shape(node.inputs[0])

@@ -87,7 +87,7 @@ OPTIONS: dict[str, dict[str, Any]] = {
     },
     "--scaling": {
         "choices": SCALINGS,
-        "help": "fix the scaling (paper, Eqs. 1 to 5; or bounded)",
+        "help": "fix the scaling (paper, Eqs. 1 to 5; or by column)",
     },
     "--components": {
         "type": count,
@@ -220,8 +220,8 @@ def run(arguments: argparse.Namespace) -> int:
         size = save(path, fitted, arguments.name, partial(_write_c, arguments))
         prices = measure(fitted)
         labels = [trial.labels for trial in fitted.dataset.trials]
-        lines = *counts_text(labels), "", summary(fitted, prices)
-        print("\n".join(lines), file=sys.stderr)
+        print("\n".join(counts_text(labels)), end="\n\n", file=sys.stderr)
+        print(summary(fitted, prices), file=sys.stderr)
         print(f"{path} ({size / 1024:.0f} kB)\n{path.with_name('golden.npz')}")
         if arguments.report:
             from train.report.model_report import write  # loads matplotlib
@@ -289,13 +289,14 @@ def _fit(arguments: argparse.Namespace) -> Fitted:
         window_s = point.window_s
         quick = front.quick
     points = arguments.decision_points
+    early = None
     if points is not None:
-        points = parse_decision_points(points, window_s or WINDOW_S)
+        early = parse_decision_points(points, window_s or WINDOW_S)
     return fit(
         arguments.data,
         **{name: getattr(arguments, name) for name in FORWARDED},
         window_s=window_s,
-        decision_points_s=points,
+        decision_points_s=early,
         arm=open_arm(arguments),
         quick=quick,
         progress=True,
@@ -312,8 +313,8 @@ def held_out_text(
     paragraphs = [f"{model.path} on the recordings of --test:", summary.text()]
     if former is not None:
         before = _scored(former, recordings)
-        both = compared(former.path, before, model.path, summary)
-        paragraphs += [f"{former.path} on them:", before.text(), both]
+        paragraphs += [f"{former.path} on them:", before.text()]
+        paragraphs.append(compared(former.path, before, model.path, summary))
     return "\n\n".join(paragraphs)
 
 

@@ -3,10 +3,12 @@
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from edge.arrays import Array, Floats
+from edge.arrays import Floats
 from edge.model.model import Model
 from edge.model.verify import answers, first_series, integers_of
 from edge.recording import Recording
@@ -27,7 +29,7 @@ def trials_of(dataset: DataSet, count: int) -> list[int]:
     y = {task: dataset.labels(task) for task in dataset.tasks}
     order = np.argsort(y[finest(y)], kind="stable")
     places = np.linspace(0, len(order) - 1, min(count, len(order))).round().astype(int)
-    return sorted({*order[places].tolist()})
+    return sorted({int(order[i]) for i in places})
 
 
 def trimmed(recording: Recording, onset_s: float, model: Model) -> Recording:
@@ -49,15 +51,16 @@ def write(path: Path, model: Model, dataset: DataSet, X: Floats) -> None:
     """
     info = model.info
     recordings = []
-    firsts = []
+    onsets_s = []
+    series = []
     for i in trials_of(dataset, TRIALS):
         trial = dataset.trials[i]
         recording = trimmed(trial.recording, trial.onset_s, model)
         first = first_series(recording, model)
         if first is not None:
             recordings.append(recording)
-            firsts.append(first)
-    onsets_s, series = zip(*firsts, strict=True)
+            onsets_s.append(first[0])
+            series.append(first[1])
     arrays = _frames(model, recordings)
     arrays["onset_s"] = np.array(onsets_s)
     arrays["series_start"] = _starts(course.t for course in series)
@@ -72,12 +75,14 @@ def write(path: Path, model: Model, dataset: DataSet, X: Floats) -> None:
         between = 0.5 * (early + np.roll(early, 1, axis=1))
         vectors = np.concatenate([early, between], axis=1)
         arrays["decision_point_vectors"] = vectors
-    skin = recordings[0].meta.get("skin", {})
-    meta = {"skin": skin, "model": info.data_digest}
+    meta = {
+        "skin": recordings[0].meta.get("skin", {}),
+        "model": info.data_digest,
+    }
     save_arrays(path, arrays | answers(model, arrays), meta, compress=True)
 
 
-def _frames(model: Model, recordings: Sequence[Recording]) -> dict[str, Array]:
+def _frames(model: Model, recordings: Sequence[Recording]) -> dict[str, NDArray[Any]]:
     """The frames of recordings, end to end, with the angles and the shear that the
     model needs."""
     keys = ["t", "frames", "valid"]
@@ -91,7 +96,7 @@ def _frames(model: Model, recordings: Sequence[Recording]) -> dict[str, Array]:
     return arrays
 
 
-def _starts(arrays: Iterable[Array]) -> Array:
+def _starts(arrays: Iterable[NDArray[Any]]) -> NDArray[Any]:
     """Where parts start and end that are laid end to end."""
     return np.cumsum([0, *map(len, arrays)])
 

@@ -92,10 +92,10 @@ def _squares_of_task(
     columns = build.by_decision_point_small(
         [-2.0 * r.T for r in rows], f"columns of {task}"
     )
-    squares = [
-        (r[:, :c] ** 2).sum(axis=1) for r, c in zip(rows, components, strict=True)
-    ]
-    lengths = [np.where(absent, np.inf, of_rows) for of_rows in squares]
+    lengths = []
+    for r, c in zip(rows, components, strict=True):
+        squares = (r[:, :c] ** 2).sum(axis=1)
+        lengths.append(np.where(absent, np.inf, squares))
     return _squares(build, task, z, z, columns, lengths)
 
 

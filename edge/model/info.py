@@ -33,7 +33,7 @@ class Task:
         labels: the answers, in the order of the scores.
         k: neighbours that vote.
         components: coordinates that distances are measured in.
-        scaling: "none", "bounded" or "I" to "V" (paper, Eqs. 1 to 5).
+        scaling: "none", "columns" or "I" to "V" (paper, Eqs. 1 to 5).
         accuracy: nested accuracy of the whole choice at export, 0 to 1.
         projection: "pca" (principal components) or "lda" (discriminants).
         features: the features that it takes, in the model's order; empty for all.

@@ -45,7 +45,6 @@ class Space(NamedTuple):
         labels: (n,) indices of their labels.
         reach, limit: the sizes at which scaled differences, and coordinates, are cut
             off.
-        bend: a scaled difference d counts as d / (1 + |d| bend).
     """
 
     columns: Integers
@@ -56,7 +55,6 @@ class Space(NamedTuple):
     labels: Integers
     reach: float = np.inf
     limit: float = np.inf
-    bend: float = 0.0
 
     @classmethod
     def of(cls, model: Model, task: str) -> Self:
@@ -91,10 +89,6 @@ class Space(NamedTuple):
             rows = columns_of_rows.T[:, :components] * (-0.5 * unit)
             # Trials without a label are infinitely far away.
             rows[np.isinf(constant("lengths"))] = np.inf
-            bend = 0.0
-            if "Div" in first:
-                growth = graph.makers[first["Div"][1]].inputs[0]
-                bend = float(value(graph.makers[growth].inputs[1]))
             return cls(
                 columns=columns,
                 mean=value(first["Sub"][1]),
@@ -104,13 +98,11 @@ class Space(NamedTuple):
                 labels=graph.constants[f"labels of {task}"],
                 reach=float(value(limits[0])),
                 limit=float(value(limits[1])) * float(unit),
-                bend=bend,
             )
 
     def differences(self, vector: Floats) -> Floats:
         """(p,) scaled differences of a feature vector from the mean."""
         scaled = (vector[self.columns] - self.mean) * self.gain
-        scaled = scaled / (1.0 + np.abs(scaled) * self.bend)
         return np.clip(scaled, -self.reach, self.reach)
 
     def coordinates(self, differences: Floats) -> Floats:

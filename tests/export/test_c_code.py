@@ -53,7 +53,7 @@ def early(tmp_path_factory):
     folder = tmp_path_factory.mktemp("early")
     for i, recording in enumerate(pressed(touch, range(8))):
         save(folder / "data" / f"{i:02d}.npz", recording)
-    words = ["--features", "contact", "moments", "joints", "--quick", "--scaling", "bounded"]
+    words = ["--features", "contact", "moments", "joints", "--quick", "--scaling", "IV"]
     words += ["--k", "2", "--decision-points", "0.3,0.6,1.2", "--c", folder / "c"]
     out = export(folder / "out", "--data", folder / "data", *words)
     model = Model(out / "model.onnx")

@@ -58,11 +58,10 @@ def rounded(values, scale=Fraction(1)):
 def projected(vectors, p):
     """Whole coordinates of vectors by the rule of `train.model.projection`.
 
-    The difference from the mean, its product with the gain and, where it is bounded, its
-    division are rounded once each, as IEEE 754 says; all that follows is in Python's
-    whole numbers.
+    The difference from the mean and its product with the gain are rounded once each, as
+    IEEE 754 says; all that follows is in Python's whole numbers.
     """
-    steps = rounded(p.scale_.scaled(vectors) / p.grid_.step)
+    steps = rounded((vectors - p.mean_) * p.gain_ / p.grid_.step)
     inside = np.clip(steps, -int(MOST_STEPS), int(MOST_STEPS))
     bit = smallest_bit(p.weights_)
     scale = Fraction(bit) * Fraction(p.grid_.step) / Fraction(p.grid_.unit)

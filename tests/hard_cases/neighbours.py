@@ -120,7 +120,7 @@ def far_error(factor, seed, n=160):
     X, queries = far_data(factor, seed, n)
     ours = Ours(X)
     p = ours.projection
-    d = (queries - p.scale_.mean) * p.scale_.gain
+    d = (queries - p.mean_) * p.gain_
     z = d @ p.weights_ / p.grid_.unit
     off = (np.abs(d / p.grid_.step).max(axis=1) > 2.0**24) | (
         np.abs(z).max(axis=1) > p.grid_.limit
@@ -150,7 +150,7 @@ class Outlier:
         rows = ours.fitted.tasks_["t"].space.rows
         self.named = coarseness(rows, p.grid_.unit) < FEWEST_UNITS
         vectors = np.concatenate([X, queries])
-        points = exact.unrounded(vectors, p.scale_.mean, p.weights_)
+        points = exact.unrounded(vectors, p.mean_, p.weights_)
         truth = [exact.nearest(points[:160], point, 1)[0][0] for point in points[160:]]
         nearest = ours.alone(queries)["neighbours"][:, 0]
         self.changed = float(np.mean(nearest != truth))
@@ -169,9 +169,9 @@ def grid_error(spread, seed):
     ours = Ours(X, choice=Choice("none", 6, 80))
     graph = ours.alone(queries)
     p = ours.projection
-    true = exact.unrounded(
-        np.concatenate([X, queries]), p.scale_.mean, p.weights_
-    ).astype(float)
+    true = exact.unrounded(np.concatenate([X, queries]), p.mean_, p.weights_).astype(
+        float
+    )
     z = ours.fitted.tasks_["t"].space.rows
     true *= np.linalg.norm(z) / np.linalg.norm(
         true[:80]

@@ -17,7 +17,7 @@ from train.choose.search import (
     nearest,
 )
 from train.data.vectors import Vectors
-from train.model.scaling import Scale
+from train.model.scaling import centred_and_scaled
 from train.threads import single_thread
 
 RIGHT = 0.51
@@ -52,11 +52,15 @@ class _Fit:
     def decomposition(self, grid: SearchGrid, rows: Integers) -> Decomposition:
         """The scaled vectors of a grid's features, fitted on some trials."""
         vectors = self.vectors.of(grid.features)
-        X = vectors.X[rows]
-        scale = Scale.of(X, grid.scaling, vectors.features, vectors.columns)
+        mean, gain, scaled = centred_and_scaled(
+            vectors.X[rows],
+            grid.scaling,
+            vectors.features,
+            vectors.columns,
+        )
         labels_of = {task: labels[rows] for task, labels in self.classes.items()}
-        new = scale.scaled(vectors.X[self.test])
-        return Decomposition(scale.scaled(X), new, labels_of)
+        new = (vectors.X[self.test] - mean) * gain
+        return Decomposition(scaled, new, labels_of)
 
     def right(
         self,

@@ -15,7 +15,7 @@ from train.data.vectors import Labels
 from train.model.agreement import products
 from train.model.pipeline import Choice
 from train.model.projection import KINDS
-from train.model.scaling import BOUNDED
+from train.model.scaling import BY_COLUMN
 
 PLAIN = (
     ("paper",),
@@ -62,14 +62,13 @@ OF_JOINTS = (("joints",), ("joints", "posture"))
 """For known things, each of `OF_SKIN` is a candidate with each of these, and with shear
 and without, where the recordings have them."""
 EARLY_WITH_JOINTS = {
-    ("contact", "sqrt_joints"): BOUNDED,
+    ("contact", "sqrt_joints"): BY_COLUMN,
     ("sqrt_joints",): "IV",
 }
 """Those tried at early decision points of recordings with joint angles, and their
 scaling. The arm tells that a thing has begun to move before the skin does. Roots let a
-small motion count, and so do bounds beside other features: most joints hardly move, some
-move far. Where columns have their own scale without bounds, more of the sure decisions
-at 0.5 s are wrong (cody18, five sets of 140: names 25 % instead of 23)."""
+small motion count. Beside other features a motion that begins counts as much as a large
+one only where every column has its own scale."""
 DRAWN = ("contact",)
 DRAWN_WITH_JOINTS = ("contact", "joints")
 """The combination tried for touches of simulated things that are drawn from kinds
@@ -246,7 +245,7 @@ class Mode:
         usual = WITH_JOINTS if joints else PLAIN
         angles = ("joints",) if joints else ()
         sheared = [(*sets, *angles) for sets in WITH_SHEAR] if shear else []
-        early = EARLY_WITH_JOINTS | dict.fromkeys(sheared, BOUNDED)
+        early = EARLY_WITH_JOINTS | dict.fromkeys(sheared, BY_COLUMN)
         return cls(
             full=[*usual[: QUICK if quick else None], *sheared],
             early=early if joints and not quick else {},

@@ -16,7 +16,7 @@ from edge.errors import InputError
 from edge.touch.features import FEATURES
 from train.data.vectors import Strings
 from train.model.projection import Grid, Spectrum, on_grid
-from train.model.scaling import Scale, finite
+from train.model.scaling import centred_and_scaled, finite
 from train.threads import single_thread
 
 MAX_COMPONENTS = 20
@@ -78,14 +78,13 @@ def neighbours(
     with single_thread():
         for i, query in enumerate(X):
             training = np.delete(np.arange(n), i)
-            scale = Scale.of(X[training], scaling, features)
-            scaled = scale.scaled(X[training])
+            mean, gain, scaled = centred_and_scaled(X[training], scaling, features)
             axes = Spectrum(scaled).leading(max_components)
             axes_count = len(axes)
             weights = on_grid(axes.T)
             grid = Grid.of(scaled, axes_count)
             differences = grid.project(scaled, weights) - grid.project(
-                scale.scaled(query), weights
+                (query - mean) * gain, weights
             )
             # Sums of squares by the first 1, 2, ... components: exact, as all are whole
             # numbers.

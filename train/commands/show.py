@@ -8,6 +8,8 @@ recordings side by side, with the decisions of --model.
 import argparse
 from pathlib import Path
 
+from edge.errors import InputError
+
 
 def add_options(parser: argparse.ArgumentParser) -> None:
     """Add the command's options."""
@@ -29,6 +31,11 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         metavar="PNG",
         help="the picture to write (default: beside the recording)",
     )
+    option(
+        "--dark",
+        action="store_true",
+        help="draw several recordings for a dark page",
+    )
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -39,12 +46,14 @@ def run(arguments: argparse.Namespace) -> int:
     first = arguments.recording[0]
     out = Path(arguments.out or Path(first).with_suffix(".png"))
     several = len(arguments.recording) > 1
+    if arguments.dark and not several:
+        raise InputError("--dark is for several recordings")
     model = None if arguments.model is None else Model(arguments.model)
     if several:
         from train.draw import comparison
 
         touches = [(path, load(path)) for path in arguments.recording]
-        comparison.draw(touches, out, model=model)
+        comparison.draw(touches, out, model=model, dark=arguments.dark)
     elif model is not None:
         from train.draw import explanation
 

@@ -32,8 +32,11 @@ MOST = 6
 TITLES = "largest force", "area", "moved"
 GAMMA = 0.4
 """Exponent of the colour scale, so that soft touches are seen beside hard ones."""
-INKS = "#1f4e79", "#b03a2e"
-"""Colours of curves and decisions."""
+INKS = {False: ["#1f4e79", "#b03a2e"], True: ["#79b8ff", "#ff9080"]}
+"""Colours of curves and decisions, on a light page and on a dark one."""
+DARK = dict.fromkeys(
+    ("figure.facecolor", "axes.facecolor", "savefig.facecolor"), "#0d1117"
+)
 
 
 def draw(
@@ -41,6 +44,7 @@ def draw(
     out: Path,
     *,
     model: Model | None = None,
+    dark: bool = False,
 ) -> None:
     """Draw up to six touches into a PNG, a column each.
 
@@ -48,6 +52,7 @@ def draw(
         recordings: names, for errors, and recordings of one skin.
         out: the picture.
         model: whose decisions are shown.
+        dark: light lines on a dark background.
 
     Raises:
         InputError: there are too many, one has no contact or does not suit the model,
@@ -60,9 +65,10 @@ def draw(
     inks: dict[str, Any] = {
         **PLAIN_TEXT,
         "font.size": 12,
-        "axes.prop_cycle": cycler(color=INKS),
+        "axes.prop_cycle": cycler(color=INKS[dark]),
     }
-    with style.context(inks):
+    page: list[Any] = ["dark_background", DARK, inks] if dark else [inks]
+    with style.context(page):
         _draw(recordings, out, model)
 
 

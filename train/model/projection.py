@@ -20,7 +20,7 @@ from sklearn.utils.validation import check_is_fitted
 from edge.arrays import Booleans, Floats, Integers
 from edge.errors import InputError
 from edge.touch.features import FEATURES
-from train.model.scaling import Scale, column_means
+from train.model.scaling import centred_and_scaled, column_means
 
 FEATURE_BITS = 22
 """Bits of the largest scaled difference from the mean in training."""
@@ -334,10 +334,10 @@ class Projection(TransformerMixin, BaseEstimator):
     """A few whole-number coordinates of feature vectors, the same bits on every
     machine.
 
-    The vectors are centred and scaled (`train.model.scaling.Scale`), rounded to 22 bits
-    and multiplied by weights of at most 24 bits. The sums are exact, and are rounded to
-    22 bits (`Grid`, `on_grid`). The directions are principal components, or the
-    discriminants of the labels (`Spectrum.discriminants`).
+    Each column's mean is subtracted, and the difference is multiplied by its feature
+    type's gain, rounded to 22 bits and multiplied by weights of at most 24 bits. The
+    sums are exact, and are rounded to 22 bits (`Grid`, `on_grid`). The directions are
+    principal components, or the discriminants of the labels (`Spectrum.discriminants`).
 
     Two vectors that differ by less than a step, about 1e-6 of a deviation, may get the
     same coordinates. A vector far outside the training set's reach is clipped.
@@ -352,7 +352,8 @@ class Projection(TransformerMixin, BaseEstimator):
         widths: columns of each feature type; None if equal.
 
     Attributes:
-        scale_: of the vectors.
+        mean_: (p,) is subtracted first.
+        gain_: (p,) multiplies the differences.
         grid_: the steps of features and coordinates.
         weights_: (p, c), from `on_grid`.
         rank_: the largest possible number of coordinates.
@@ -387,8 +388,12 @@ class Projection(TransformerMixin, BaseEstimator):
         """
         X = np.asarray(X, dtype=np.float64)
         self.n_features_in_ = X.shape[1]
-        self.scale_ = Scale.of(X, self.scaling, self.features, self.widths)
-        d = self.scale_.scaled(X)
+        self.mean_, self.gain_, d = centred_and_scaled(
+            X,
+            self.scaling,
+            self.features,
+            self.widths,
+        )
         axes, self.gap_ = self._axes(d, y)
         self.rank_ = axes.shape[1]
         self.weights_ = on_grid(axes[:, : self.components])
@@ -420,5 +425,5 @@ class Projection(TransformerMixin, BaseEstimator):
     def transform(self, X: Floats) -> Floats:
         """Coordinates (n, c), multiples of `grid_.unit`, of vectors (n, p)."""
         check_is_fitted(self)
-        d = self.scale_.scaled(np.asarray(X, dtype=np.float64))
+        d = (np.asarray(X, dtype=np.float64) - self.mean_) * self.gain_
         return self.grid_.project(d, self.weights_)

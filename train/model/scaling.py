@@ -1,9 +1,6 @@
 """Scaling of feature vectors: a gain for each feature type."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,13 +13,13 @@ from train.data.vectors import widths_of
 
 OF_PAPER = ("none", "I", "II", "III", "IV", "V")
 """No scaling, and Methods I to V of the paper's Eqs. 1 to 5."""
-BOUNDED = "bounded"
-"""Every column by its own mean distance from its median, and far differences bounded:
-what a feature says before it has risen counts as much as what it says later, and that a
-thing moves counts more than how far."""
-SCALINGS = (*OF_PAPER, BOUNDED)
-ROUNDING = 8.0 * float(np.finfo(float).eps)
-"""Smallest spread, over the largest size, that is not taken for rounding."""
+BY_COLUMN = "columns"
+"""Every column by its own deviation: what a feature says before it has risen counts as
+much as what it says later."""
+SCALINGS = (*OF_PAPER, BY_COLUMN)
+SHARE_OF_TYPE = 0.1
+"""The part that the variance of the type has in that of a column, so that a column that
+hardly varies counts at most about three times as much as by Method IV."""
 SMALLEST_SCALE = 1e-30
 LARGEST_SCALE = 1e100
 """Sizes of scaled features whose grid steps and squares are ordinary float64
@@ -72,8 +69,9 @@ def scale_of(
 
     Args:
         X: (n, p).
-        method: one of `OF_PAPER`. Method V brings contact_motion to the range of max_force
-            and contact_area and leaves all else alone; without them it is no scaling.
+        method: one of `SCALINGS`; `BY_COLUMN` has the gains of Method IV here. Method V
+            brings contact_motion to the range of max_force and contact_area and leaves
+            all else alone; without them it is no scaling.
         features: names of the types, in the order of X.
         widths: columns of each; equal where None.
 
@@ -96,12 +94,12 @@ def scale_of(
     largest, powers = np.frexp(magnitudes)
     if method in ("I", "II"):
         return _inverse(largest, powers)
-    if method == "IV":
+    if method in ("IV", BY_COLUMN):
         wide = np.array([feature(name).wide for name in features])
         small = np.ldexp(X, -np.repeat(powers, sizes))
         deviations = _deviations(small, sizes, wide)
         # A spread below the rounding of its own mean is no spread.
-        deviations[deviations <= ROUNDING * largest] = 0.0
+        deviations[deviations <= 8 * np.finfo(float).eps * largest] = 0.0
         return _inverse(deviations, powers)
     ranges = magnitudes[np.isin(features, FEATURES[:2])]
     if ranges.size and FEATURES[2] in features:
@@ -113,7 +111,7 @@ def scale_of(
 def _inverse(scale: Floats, powers: NDArray[np.int32]) -> Floats:
     """1 / (scale * 2^powers); 0 where the scale is 0."""
     gain = np.divide(1.0, scale, out=np.zeros_like(scale), where=scale > 0.0)
-    with np.errstate(over="ignore"):  # `Scale.of` refuses infinite gains
+    with np.errstate(over="ignore"):  # `centred_and_scaled` refuses infinite gains
         return np.asarray(np.ldexp(gain, -powers))
 
 
@@ -135,60 +133,36 @@ def _deviations(
     return np.asarray(np.sqrt(np.add.reduceat(squares, starts) / sizes))
 
 
-@dataclass(frozen=True)
-class Scale:
-    """How feature vectors are centred and scaled.
+def centred_and_scaled(
+    X: Floats,
+    method: str,
+    features: Sequence[str] = FEATURES,
+    widths: Sequence[int] | None = None,
+) -> tuple[Floats, Floats, Floats]:
+    """Mean (p,) and gain (p,) of each column of X (n, p), and (X - mean) * gain (n, p).
 
-    Attributes:
-        mean: (p,) is subtracted first; the median where differences are bounded.
-        gain: (p,) multiplies the difference.
-        bounded: whether a difference d then counts as d / (1 + |d|), which no rare
-            large value exceeds.
+    A scaling shifts each type by a constant, which centring takes away again: the mean
+    is subtracted from the features themselves, where it loses nothing. See `scale_of`.
+
+    Raises:
+        InputError: the scale is beyond what distances hold.
     """
-
-    mean: Floats
-    gain: Floats
-    bounded: bool = False
-
-    @classmethod
-    def of(
-        cls,
-        X: Floats,
-        method: str,
-        features: Sequence[str] = FEATURES,
-        widths: Sequence[int] | None = None,
-    ) -> Scale:
-        """The scale of vectors X (n, p) by one of `SCALINGS`.
-
-        A scaling shifts each type by a constant, which centring takes away again: the
-        mean is subtracted from the features themselves, where it loses nothing. See
-        `scale_of`.
-
-        Raises:
-            InputError: the scale is beyond what distances hold.
-        """
-        # The order in memory decides the order of sums, and so which of equal axes is
-        # taken.
-        X = np.ascontiguousarray(X, dtype=np.float64)
-        with np.errstate(over="ignore", invalid="ignore"):
-            if method == BOUNDED:
-                mean = np.median(X, axis=0)
-                sizes = column_means(np.abs(X - mean))
-                sizes[sizes <= ROUNDING * np.abs(X).max(axis=0, initial=0.0)] = 0.0
-                gain = _inverse(*np.frexp(sizes))
-            else:
-                mean = column_means(X)
-                gains = scale_of(X, method, features, widths)
-                gain = np.repeat(gains, widths_of(X.shape[1], features, widths))
-            largest = float(np.abs((X - mean) * gain).max(initial=0.0))
-        if not (largest == 0.0 or SMALLEST_SCALE <= largest <= LARGEST_SCALE):
-            raise InputError(
-                f"the features spread over {largest:g} once scaled; distances need "
-                f"{SMALLEST_SCALE:g} to {LARGEST_SCALE:g}: store them in other units"
-            )
-        return cls(mean, gain, method == BOUNDED)
-
-    def scaled(self, X: Floats) -> Floats:
-        """(n, p) what vectors count as."""
-        d = np.asarray((X - self.mean) * self.gain)
-        return d / (1.0 + np.abs(d)) if self.bounded else d
+    # The order in memory decides the order of sums, and so which of equal axes is
+    # taken.
+    X = np.ascontiguousarray(X, dtype=np.float64)
+    with np.errstate(over="ignore", invalid="ignore"):
+        mean = column_means(X)
+        gains = scale_of(X, method, features, widths)
+        gain = np.repeat(gains, widths_of(X.shape[1], features, widths))
+        d = (X - mean) * gain
+        if method == BY_COLUMN:
+            blend = (1.0 - SHARE_OF_TYPE) * d.var(axis=0) + SHARE_OF_TYPE
+            gain /= np.sqrt(blend)
+            d = (X - mean) * gain
+    largest = float(np.abs(d).max(initial=0.0))
+    if not (largest == 0.0 or SMALLEST_SCALE <= largest <= LARGEST_SCALE):
+        raise InputError(
+            f"the features spread over {largest:g} once scaled; distances need "
+            f"{SMALLEST_SCALE:g} to {LARGEST_SCALE:g}: store them in other units"
+        )
+    return mean, gain, d

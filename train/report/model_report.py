@@ -156,14 +156,13 @@ def _space(fitted: FittedTask, labels: Integers) -> Space:
     grid = projection.grid_
     return Space(
         columns=fitted.space.columns,
-        mean=projection.scale_.mean,
-        gain=projection.scale_.gain,
+        mean=projection.mean_,
+        gain=projection.gain_,
         weights=projection.weights_[:, : fitted.components],
         rows=fitted.rows,
         labels=labels,
         reach=MOST_STEPS * grid.step,
         limit=grid.limit * grid.unit,
-        bend=float(projection.scale_.bounded),
     )
 
 

@@ -75,13 +75,11 @@ def test_a_trial_without_a_label_is_no_rival():
 def test_a_task_is_explained_by_its_own_columns_and_trials_at_the_full_window(
     model, tmp_path
 ):
-    """Three decision points; one task takes one feature, another lacks labels, and the
-    differences of a third are bounded."""
+    """Three decision points; one task takes one feature, the other lacks labels."""
     info = replace(model.info, decision_points_s=(0.3, 0.6, 1.2))
     choices = {
         "of_area": Choice("none", 4, 3, features=("contact_area",)),
         "partial": Choice("none", 4, 3),
-        "bounded": Choice("bounded", 4, 3),
     }
     rng = np.random.default_rng(0)
     X = rng.normal(size=(3, 60, info.width))
@@ -90,7 +88,6 @@ def test_a_task_is_explained_by_its_own_columns_and_trials_at_the_full_window(
     y = {
         "of_area": np.array(["a", "b", "c"] * 20),
         "partial": np.array(["d", "e", "", "d"] * 15),
-        "bounded": np.array(["f", "g"] * 30),
     }
     _, model = fitted_model(tmp_path / "model.onnx", info, choices, X, y)
     assert model.decide(vectors[-1])["partial"].out_of_range

@@ -108,7 +108,7 @@ def test_leading_axes_give_the_coordinates_of_a_projection_to_the_bit(
         model = Projection("none", components, ["max_force"]).fit(X)
         ours = Spectrum(X).leading(components)
         signs = np.sign((ours @ model.weights_).diagonal())
-        d = X - model.scale_.mean
+        d = X - model.mean_
         z = model.grid_.project(d, on_grid(ours.T))
         assert (z * signs == model.transform(X)).all()
 

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from matplotlib import image
 
 from edge import demo
 from edge.errors import InputError
@@ -41,6 +42,14 @@ def test_the_curves_of_a_row_share_a_scale_that_holds_each_of_them(axes):
         assert max(axis.lines[0].get_ydata()) <= axis.get_ylim()[1]
 
 
+def test_a_dark_page_gets_light_lines_on_a_dark_background(tmp_path):
+    for name, words in (("light", []), ("dark", ["--dark"])):
+        out = tmp_path / f"{name}.png"
+        assert main(["show", *TOUCHES[:2], *words, "--out", str(out)]) == 0
+        corner = image.imread(out)[0, 0, :3]
+        assert (corner.mean() < 0.1) == (name == "dark")
+
+
 def test_contacts_are_numbered_from_one(make_touch):
     comparison.contact_of("a", make_touch(), 1)
     for number in (0, 2):
@@ -68,3 +77,8 @@ def test_touches_in_other_units_do_not_share_an_axis(make_touch, tmp_path):
     with pytest.raises(InputError, match=sentence):
         comparison.draw([("a", touch), ("b", in_counts)], tmp_path / "a.png")
     assert not (tmp_path / "a.png").exists()
+
+
+def test_a_dark_page_is_for_several_recordings(refusal, tmp_path):
+    message = refusal("show", TOUCHES[0], "--dark", "--out", tmp_path / "a.png")
+    assert message == "edge-classify: --dark is for several recordings"

@@ -6,7 +6,7 @@ import pytest
 from edge.errors import InputError
 from tests.hard_cases.models import features
 from train.model.projection import Projection
-from train.model.scaling import BOUNDED, OF_PAPER, Scale, scale_of
+from train.model.scaling import BY_COLUMN, OF_PAPER, centred_and_scaled, scale_of
 
 
 def test_scalings_are_the_papers_equations_per_feature_type_but_for_their_offsets():
@@ -34,15 +34,15 @@ def test_a_wide_feature_deviates_from_the_mean_of_each_column():
     assert gain.tolist() == [1.0]
 
 
-def test_a_bounded_value_counts_a_half_at_the_mean_distance_and_never_one():
-    X = np.array([[-3.0, 1.0], [0.0, 1.0], [0.0, 1.0], [1.0, 1.0 + 2e-16]])
-    scale = Scale.of(X, BOUNDED)
-    assert scale.gain.tolist() == [1.0, 0.0]  # the second varies by its rounding
-    assert scale.scaled(X)[:, 0].tolist() == [-0.75, 0.0, 0.0, 0.5]
-    assert 0.999 < scale.scaled(np.array([[1e9, 1.0]]))[0, 0] < 1.0
+def test_columns_count_alike_but_for_those_that_hardly_vary():
+    """Half of the columns have all of their type's variance, twice its mean."""
+    X = np.random.default_rng(0).normal(size=(30, 2)) * [30.0, 0.0]
+    _, gain, _ = centred_and_scaled(X, BY_COLUMN, ["taxel_force_mean"], [2])
+    of_type = scale_of(X, "IV", ["taxel_force_mean"], [2])
+    assert gain / of_type == pytest.approx([1.9**-0.5, 0.1**-0.5])
 
 
-@pytest.mark.parametrize("method", ["I", "IV", "V", BOUNDED])
+@pytest.mark.parametrize("method", ["I", "IV", "V", BY_COLUMN])
 def test_a_feature_type_that_told_nothing_in_training_is_dropped(method):
     X = features(30)
     X[:, 80:] = 0.0
