@@ -155,12 +155,13 @@ def judge(data, quick, jobs):
 
 
 def measure(data, quick, jobs):
-    """Measure; print and write a table for each size of the data sets."""
+    """Measure; print and write a file for each size of the data sets."""
     of_size = {}
     for folder in data:
         sets = of_size.setdefault(len([*Path(folder).rglob("*.npz")]), [])
         sets.append(judge(folder, quick, jobs))
-    tables.write("stopping", [rows(trials, sets) for trials, sets in of_size.items()])
+    for trials, sets in of_size.items():
+        tables.write(f"stopping_{trials}", [rows(trials, sets)])
 
 
 def rows(trials, sets):
