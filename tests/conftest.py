@@ -30,10 +30,9 @@ settings.register_profile("same", derandomize=True, deadline=None)
 settings.register_profile("explore", derandomize=False, deadline=None)
 settings.load_profile("explore" if os.environ.get("EXPLORE") else "same")
 
-FAST_S = 15.0
+FAST_S = 5.0
 """Seconds of processor time that a test without the mark `slow` may take, its fixtures
-among them, on a machine that adds a million numbers in `LOOP_S`. Most take below 1 s.
-Beside work that fills the caches one took 10.6 s where adding took no longer."""
+among them, on a machine that adds a million numbers in `LOOP_S`."""
 LOOP_S = 0.05
 STARTED = pytest.StashKey[float]()
 
