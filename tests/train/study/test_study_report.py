@@ -100,16 +100,19 @@ def studied(tmp_path_factory):
     return out
 
 
-def test_every_number_of_the_report_is_in_a_csv(studied):
+@pytest.mark.slow
+def test_every_number_of_the_report_is_in_a_csv_and_the_findings_come_first(studied):
     text = (studied / "report.html").read_text()
-    links = set(re.findall(r'(?:src|srcset|href)="(?!data:image/png)([^"]*)"', text))
+    links = re.findall(r'(?:src|srcset|href)="(?!data:image/png)([^"]*)"', text)
     tables = {path.name for path in studied.glob("*.csv")}
-    assert links == tables
+    assert {*links} == tables
     assert tables > {"methods.csv", "window.csv", "scaling.csv", "resolution.csv"}
     assert "features.csv" in tables
     assert 2 * len(list(studied.glob("*.png"))) == text.count("data:image/png")
+    assert re.findall(r"<h2>([^<]+)", text)[0] == "Findings"
 
 
+@pytest.mark.slow
 def test_equal_scalings_are_equal(studied):
     """Methods I and II, and none and III, differ by what centring takes away."""
     rows = pd.read_csv(studied / "scaling.csv", keep_default_na=False)
@@ -119,11 +122,7 @@ def test_equal_scalings_are_equal(studied):
     assert (scaled["none"] == scaled["III"]).all()
 
 
-def test_the_findings_come_first(studied):
-    text = (studied / "report.html").read_text()
-    assert re.findall(r"<h2>([^<]+)", text)[0] == "Findings"
-
-
+@pytest.mark.slow
 def test_every_method_has_a_row_and_one_recognises_easy_touches(studied):
     compared = pd.read_csv(studied / "methods.csv")
     assert compared["method"].nunique() == len(methods.OURS) + 4
@@ -153,6 +152,7 @@ def test_the_findings_name_no_best_method_below_the_papers():
     assert "unseen objects). No method here does better." in sentence(49, 47)
 
 
+@pytest.mark.slow
 def test_in_a_browser_nothing_overflows_or_is_missing(studied):
     assert browser.faults(studied / "report.html") == []
 

@@ -119,6 +119,7 @@ class TestCosts:
         assert costs.difference(before, after, fewer=False)[0] == -50.0
         assert costs.difference(before, after, fewer=True)[0] == 0.0
 
+    @pytest.mark.slow
     def test_every_change_is_measured_on_its_own_recordings(self, recordings):
         raw = read([recordings])
         cases = {case.name: case for case in costs.changes(raw, followed(raw), 100.0)}
@@ -335,30 +336,22 @@ def written(tmp_path_factory):
     return SimpleNamespace(report=report, text=report.read_text(), digest=digest)
 
 
-def test_the_report_needs_no_other_page(written):
+@pytest.mark.slow
+def test_the_report_tells_of_the_board_and_needs_no_other_page(written):
+    ready = "62 MB of memory, and the model is ready 812 ms after the start of Python"
+    assert ready in written.text
+    assert written.report.with_name("tradeoff.png").read_bytes().startswith(b"\x89PNG")
     assert "http" not in written.text
     assert not browser.available() or browser.faults(written.report) == []
 
 
-def test_the_report_tells_memory_and_start_of_the_board(written):
-    ready = "62 MB of memory, and the model is ready 812 ms after the start of Python"
-    assert ready in written.text
-
-
-def test_the_pictures_lie_beside_the_report(written):
-    png = written.report.with_name("tradeoff.png").read_bytes()
-    assert png.startswith(b"\x89PNG")
-
-
-def test_each_change_has_a_row_with_its_price_and_points(written):
+@pytest.mark.slow
+def test_each_change_and_the_front_of_quick_choices_lie_beside_the_report(written):
     rows = rows_of(written.report.with_name("costs.csv"))
     changes = {row["change"]: row for row in rows}
     assert changes["all candidates"]["category, points"].startswith("+0 (")
     assert changes["waiting 0.4 s"]["category, points"].startswith("+0 (-")
     assert changes["28 of 28 trials"]["saves or costs"] == "0 recordings fewer"
-
-
-def test_the_front_of_quick_choices_lies_beside_the_report(written):
     front = ParetoFront.read(written.report.with_name("front.json"), written.digest)
     assert front.task == "category"
     assert front.quick
