@@ -10,11 +10,13 @@ import time
 from contextlib import suppress
 from dataclasses import replace
 from itertools import product
+from multiprocessing import active_children
 from pathlib import Path
 
 import numpy as np
 import pytest
 from hypothesis import settings
+from joblib.externals.loky import get_reusable_executor
 
 import train
 from edge.cli import main as edge_classify
@@ -30,6 +32,8 @@ settings.register_profile("same", derandomize=True, deadline=None)
 settings.register_profile("explore", derandomize=False, deadline=None)
 settings.load_profile("explore" if os.environ.get("EXPLORE") else "same")
 
+# pytest keeps every core busy itself.
+os.environ.setdefault("LOKY_MAX_CPU_COUNT", "1")
 FAST_S = 5.0
 """Seconds of processor time that a test without the mark `slow` may take, its fixtures
 among them, on a machine that adds a million numbers in `LOOP_S`."""
@@ -42,6 +46,8 @@ REAL = ROOT.parent / "shared" / "real"
 
 def processor_s():
     """Seconds of processor time of this process and of those that it has waited for."""
+    if active_children():
+        get_reusable_executor().shutdown()  # or they count for a later test
     times = os.times()
     return times.user + times.system + times.children_user + times.children_system
 

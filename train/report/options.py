@@ -1,8 +1,9 @@
 """Options of the commands that write a report."""
 
 import argparse
-import os
 from pathlib import Path
+
+from joblib import cpu_count
 
 from edge.commands.options import within
 
@@ -26,6 +27,6 @@ def add_report_options(parser: argparse.ArgumentParser, out: str) -> None:
     option(
         "--jobs",
         type=within(int, 1, 1000),
-        default=os.cpu_count() or 1,
+        default=cpu_count(),
         help="processes (default: all cores)",
     )

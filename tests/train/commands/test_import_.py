@@ -16,20 +16,17 @@ def test_a_name_too_long_to_be_looked_up_is_one_sentence(tmp_path, refusal):
 
 def test_data_without_thresholds_get_those_of_their_noise(make_touch, tmp_path, capsys):
     noise = np.random.default_rng(0).integers(0, 41, (20, 16, 24)).astype(np.uint16)
-    options = {"seconds": 0.1, "lead_s": 0.1, "arm": False}
-    touches = [make_touch(seed=seed, **options) for seed in range(2)]
-    for i, touch in enumerate(touches):
+    for seed in range(2):
+        touch = make_touch(seed=seed, seconds=0.1, lead_s=0.1, arm=False)
         write_frames(
-            tmp_path / "csv" / f"trial{i}",
+            tmp_path / "csv" / f"trial{seed}",
             touch.t,
             np.maximum(touch.frames, noise),
         )
     words = ["import", "csv", str(tmp_path / "csv"), "--frames", "--out"]
     assert main([*words, str(tmp_path / "out")]) == 0
-    assert (
-        "threshold 80 and onset 120 counts, from the noise before contact: 2 of 2 have "
-        "a" in (capsys.readouterr().out)
-    )
+    sentence = "onset 120 counts, from the noise before contact: 2 of 2 have a"
+    assert sentence in capsys.readouterr().out
     layout = load(tmp_path / "out" / "trial0.npz").layout
     assert layout.threshold_counts == 80
     assert layout.onset == 120

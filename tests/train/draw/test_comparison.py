@@ -21,7 +21,6 @@ def axes(tmp_path_factory, drawn):
     """(4, 4) axes of four touches with a model's decisions, a column each."""
     out = tmp_path_factory.mktemp("picture") / "four.png"
     assert main(["show", *TOUCHES, "--model", str(demo.MODEL), "--out", str(out)]) == 0
-    assert out.read_bytes()[:4] == b"\x89PNG"
     return np.reshape(drawn[0].axes[:16], (4, 4))
 
 
