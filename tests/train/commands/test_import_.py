@@ -25,8 +25,10 @@ def test_data_without_thresholds_get_those_of_their_noise(make_touch, tmp_path, 
         )
     words = ["import", "csv", str(tmp_path / "csv"), "--frames", "--out"]
     assert main([*words, str(tmp_path / "out")]) == 0
-    sentence = "onset 120 counts, from the noise before contact: 2 of 2 have a"
-    assert sentence in capsys.readouterr().out
+    assert (
+        "threshold 80 and onset 120 counts, from the noise before contact: 2 of 2 have "
+        "a" in capsys.readouterr().out
+    )
     layout = load(tmp_path / "out" / "trial0.npz").layout
     assert layout.threshold_counts == 80
     assert layout.onset == 120

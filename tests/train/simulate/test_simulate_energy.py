@@ -171,8 +171,7 @@ def pair_scene(first, second):
     return trial_scene
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("step_s", [0.01, 0.0025])
+@pytest.mark.parametrize("step_s", [0.01, pytest.param(0.0025, marks=pytest.mark.slow)])
 @pytest.mark.parametrize("first", CONTACT)
 def test_no_effect_and_no_pair_of_them_makes_energy(first, step_s):
     for second in CONTACT[CONTACT.index(first) :]:
