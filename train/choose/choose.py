@@ -223,7 +223,7 @@ class Choosing:
             for candidate, pick in zip(self.candidates, settings.picks, strict=True)
             if pick is not None and not candidate.known
         ]
-        options = early_options(picks, full)
+        options = early_options(picks, full, self._widths)
         if not options:
             return None
         choices = [choice for option in options for choice in option.values()]

@@ -84,24 +84,32 @@ class SureDecisions:
         return float(np.interp(means_s, seconds, wrong).mean())
 
 
-def early_options(picks: Sequence[Choice], full: Choices) -> list[dict[str, Choice]]:
+def early_options(
+    picks: Sequence[Choice], full: Choices, widths: Mapping[str, int]
+) -> list[dict[str, Choice]]:
     """[option]{task: its settings} of candidates for early decision points: the
     features, scalings and discriminants of the best settings at the full window of each
     candidate that was not dropped there, with several shrinkages.
 
-    Early decisions measure no feature that the full window does not.
+    None has more columns than the narrowest settings of the full window, so that there
+    is room for many decision points.
 
     Args:
         picks: these settings.
         full: {task: its settings at the full window}. The graph has one number of
             neighbours for all decision points.
+        widths: {feature: its columns}.
     """
-    measured = {name for choice in full.values() for name in choice.features}
+
+    def columns(choice: Choice) -> int:
+        return sum(widths[name] for name in choice.features)
+
+    room = min(map(columns, full.values()))
     most = max((len(pick.targets) for pick in picks), default=0)
     options = {}
     for pick, shrinkage in product(picks, SHRINKAGES):
-        is_measured = measured.issuperset(pick.features)
-        if pick.projection == "lda" and len(pick.targets) == most and is_measured:
+        side_by_side = pick.projection == "lda" and len(pick.targets) == most
+        if side_by_side and columns(pick) <= room:
             kind = replace(pick, k=1, components=MOST_COMPONENTS, shrinkage=shrinkage)
             options[kind] = {
                 task: replace(kind, k=at_end.k) for task, at_end in full.items()

@@ -80,17 +80,17 @@ def test_decision_points_before_the_full_window_have_settings_of_their_own(
     assert len(early.by_fold) == 10
 
 
-def test_options_are_the_surviving_discriminants_of_features_that_are_measured_anyway():
+def test_options_are_surviving_discriminants_no_wider_than_the_full_window():
     together = Choice("IV", 9, 1, "lda", 1e-3, ("max_force",), ("t", "u"))
     full = {"t": replace(together, k=5), "u": together}
     picks = [
         together,
         replace(together, scaling="columns"),
         replace(together, targets=()),
-        replace(together, features=("contact_area",)),
+        replace(together, features=("max_force", "contact_area")),
         replace(together, projection="pca"),
     ]
-    options = early_options(picks, full)
+    options = early_options(picks, full, {"max_force": 5, "contact_area": 5})
     assert {option["t"].scaling for option in options} == {"IV", "columns"}
     assert {option["t"].shrinkage for option in options} == set(SHRINKAGES)
     assert {(option["t"].k, option["u"].k) for option in options} == {(5, 1)}
