@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from edge.errors import InputError
@@ -112,6 +113,7 @@ class ContactTracker:
         """
         is_first = self._t == -math.inf
         self._check(frame)
+        frame = self._living(frame)
         active = ActiveTaxels(
             frame.counts,
             self.layout.threshold_counts,
@@ -132,6 +134,18 @@ class ContactTracker:
                 contacts.append(contact)
                 self._follow(contact, frame, active, region)
         self.contacts = [contact for contact in contacts if not contact.ended]
+        return self._confirmed(contacts)
+
+    def _living(self, frame: Frame) -> Frame:
+        """The frame without the skin's dead taxels, whatever they read."""
+        if not self.layout.dead:
+            return frame
+        alive = self.layout.alive
+        valid = alive if frame.valid is None else alive & frame.valid
+        return replace(frame, counts=frame.counts * alive, valid=valid)
+
+    def _confirmed(self, contacts: Sequence[Contact]) -> list[Contact]:
+        """The contacts that have lasted long enough to count."""
         return [contact for contact in contacts if contact.frames >= self._debounce]
 
     def _regions(
