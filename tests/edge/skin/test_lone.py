@@ -13,132 +13,95 @@ from edge.touch.layout import SkinLayout
 from edge.touch.track import ContactTracker
 
 LAYOUT = SkinLayout(8, 8, threshold_counts=40, onset_counts=60)
-N = 560
-T = np.arange(N) / 100.0
-NOISE = np.random.default_rng(65).standard_normal(N)
-CHANCE = np.random.default_rng(66).random(N)
-TOUCHES_S = (1.0, 2.2, 3.4, 4.6)
+T = np.arange(560) / 100.0
+DRAW = np.random.default_rng(65)
+TOUCHES_S = [1.0, 2.2, 3.4, 4.6]
 
 
-def felt(place, counts):
-    """(onsets of contacts that are not late, [[row, col] named, ...]) of a fake skin
-    with four touches and a taxel with some counts."""
-    frames = np.zeros((N, 8, 8))
+def felt(counts, layout=LAYOUT):
+    """(onsets of contacts that are not late, [row, col] of the taxels named) of a fake
+    skin with four touches, and with some counts of taxel (7, 3)."""
+    frames = np.zeros((len(T), 8, 8))
     for begin_s in TOUCHES_S:
-        age_s = T - begin_s
-        is_touched = (age_s >= 0.0) & (age_s < 0.6)
-        frames[:, 2:4, 2:4] += (is_touched * (100 + 200 * age_s))[:, None, None]
-    frames[:, *place] += counts
-    recording = Recording(T, np.clip(frames, 0, 60000).astype(np.uint16))
+        frames[(begin_s <= T) & (begin_s + 0.6 > T), 2:4, 2:4] = 300
+    frames[:, 7, 3] = counts
     contacts = {}
     named = []
-    skin, playback = play(skin_file(LAYOUT), recording)
+    skin, _ = play(skin_file(layout), Recording(T, frames.astype(np.uint16)))
+    tracker = ContactTracker(layout)
     with skin:
-        tracker = ContactTracker(LAYOUT, horizon_s=1.2)
-        for frame in Loop(skin, lasts_s=playback.ends).frames():
+        for frame in Loop(skin, lasts_s=T[-1]).frames():
             contacts |= dict.fromkeys(tracker.push(frame))
-            named.append(skin.broken_changes())
-    onsets = [round(contact.onset_s, 2) for contact in contacts if not contact.late]
-    return onsets, [places for places in named if places is not None]
+            named += skin.broken_changes() or []
+    return [round(c.onset_s, 2) for c in contacts if not c.late], named
 
 
 @pytest.mark.parametrize(
     "counts",
-    [500 + 0 * NOISE, 5000 + 600 * NOISE, 500 * (CHANCE < 0.2)],
+    [500, DRAW.normal(5000, 600, len(T)), 500 * (DRAW.random(len(T)) < 0.2)],
     ids=["stuck", "noisy", "flickers"],
 )
 def test_a_broken_taxel_is_named_and_hides_no_touch(counts):
-    onsets, named = felt((7, 3), counts)
+    onsets, named = felt(counts)
     assert set(TOUCHES_S) <= set(onsets)
-    assert [[7, 3]] in named
+    assert named == [[7, 3]]
 
 
-def test_nothing_is_named_where_all_taxels_work():
-    assert felt((5, 5), 0 * T) == (list(TOUCHES_S), [])
+def test_a_skin_without_a_broken_taxel_or_a_threshold_names_none():
+    assert felt(0) == (TOUCHES_S, [])
+    assert felt(3, replace(LAYOUT, threshold_counts=0))[1] == []
 
 
-def broken_at(frames, *, shape=(8, 8), wraps=False, step_s=0.1):
-    """When each taxel (row, col) is first broken, of frames {taxel: counts}."""
+COUNTS = {".": (0, 0), "w": (40, 0), "A": (41, 0), "B": (41, 41)}
+"""Counts of a taxel and of one beside it."""
+
+
+def changes(states, shape=(8, 8), place=(3, 3), *, wraps=False, dead=0):
+    """The frames, ten a second, after which a taxel begins or ceases to be broken."""
     taxels = LoneTaxels(*shape, wraps=wraps)
-    valid = np.ones(shape, dtype=bool)
-    at = {}
-    for i, pressed in enumerate(frames):
+    valid = np.arange(shape[0] * shape[1]).reshape(shape) >= dead
+    broken = [False]
+    for i, state in enumerate(states):
         counts = np.zeros(shape, np.uint16)
-        for place, count in pressed.items():
-            counts[place] = count
-        taxels.follow(counts, 40, valid, i * step_s)
-        for place in map(tuple, np.argwhere(taxels.broken).tolist()):
-            at.setdefault(place, i)
-    return at
-
-
-ALONE = {(3, 3): 41}
-
-
-@pytest.mark.parametrize(
-    ("frames", "broken"),
-    [
-        ([ALONE] * 6, {(3, 3): 5}),
-        ([ALONE] * 5, {}),
-        ([{(3, 3): 40}] * 90, {}),
-        ([{}] * 2 + [ALONE] * 21, {(3, 3): 22}),
-        ([{}] * 2 + [ALONE] * 20, {}),
-        ([{}] * 2 + ([ALONE] + [{}] * 4) * 4 + [ALONE], {(3, 3): 22}),
-        ([{}] * 2 + ([ALONE] + [{}] * 5) * 9, {}),
-        ([{}] * 2 + ([ALONE] * 19 + [{(3, 3): 41, (4, 4): 41}]) * 3, {}),
-    ],
-)
-def test_it_is_broken_after_half_a_second_from_the_start_and_two_seconds_later(
-    frames, broken
-):
-    assert broken_at(frames) == broken
-
-
-@pytest.mark.parametrize(
-    ("shape", "place", "wraps", "broken"),
-    [
-        ((1, 5), (0, 2), False, False),
-        ((2, 2), (0, 0), True, False),
-        ((4, 6), (0, 0), False, False),
-        ((4, 6), (0, 1), False, True),
-        ((4, 6), (0, 0), True, True),
-    ],
-)
-def test_a_taxel_with_fewer_than_five_neighbours_is_no_judge_of_itself(
-    shape, place, wraps, broken
-):
-    """A pad of a glove is touched by one taxel alone."""
-    frames = [{place: 500}] * 60
-    assert (place in broken_at(frames, shape=shape, wraps=wraps)) == broken
-
-
-def test_dead_neighbours_do_not_count():
-    counts = np.zeros((3, 3), np.uint16)
-    counts[1, 1] = 500
-    for dead, broken in ((4, False), (3, True)):
-        taxels = LoneTaxels(3, 3, wraps=False)
-        valid = np.arange(9).reshape(3, 3) >= dead
-        for i in range(6):
-            taxels.follow(counts, 40, valid, i / 10)
-        assert taxels.broken[1, 1] == broken
-
-
-def test_it_is_trusted_again_after_half_a_second_of_silence():
-    taxels = LoneTaxels(3, 3, wraps=False)
-    valid = np.ones((3, 3), dtype=bool)
-    states = []
-    for i in range(14):
-        counts = np.zeros((3, 3), np.uint16)
-        counts[1, 1] = 500 * (i <= 6)
+        counts[place], counts[-1, place[1] - 1] = COUNTS[state]
         taxels.follow(counts, 40, valid, i / 10)
-        states.append(bool(taxels.broken[1, 1]))
-    assert states == [False] * 5 + [True] * 6 + [False] * 3
+        broken.append(taxels.broken[place])
+    return np.flatnonzero(np.diff(broken)).tolist()
 
 
-def test_a_skin_without_a_threshold_judges_no_taxel():
-    counts = np.zeros((300, 8, 8), np.uint16)
-    counts[:, 4, 4] = 3
-    recording = Recording(T[:300], counts)
-    skin, _ = play(skin_file(replace(LAYOUT, threshold_counts=0)), recording)
-    with skin:
-        assert all(frame.valid.all() for frame in Loop(skin, lasts_s=3.0).frames())
+@pytest.mark.parametrize(
+    ("states", "frames"),
+    [
+        ("A" * 6, [5]),
+        ("A" * 5, []),
+        ("w" * 90, []),
+        (".." + "A" * 21, [22]),
+        (".." + "A" * 20, []),
+        (".." + "A...." * 4 + "A", [22]),
+        (".." + "A....." * 9, []),
+        (".." + ("A" * 19 + "B") * 3, []),
+        ("A" * 7 + "B" + "." * 7, [5, 12]),
+    ],
+)
+def test_it_is_alone_for_half_a_second_from_the_start_or_two_until_it_is_silent(
+    states, frames
+):
+    assert changes(states, (4, 6), (3, 3)) == frames
+
+
+@pytest.mark.parametrize(
+    ("shape", "place", "more", "is_judged"),
+    [
+        ((1, 5), (0, 2), {}, False),
+        ((2, 2), (0, 0), {"wraps": True}, False),
+        ((4, 6), (0, 0), {}, False),
+        ((4, 6), (0, 1), {}, True),
+        ((4, 6), (0, 0), {"wraps": True}, True),
+        ((3, 3), (1, 1), {"dead": 3}, True),
+        ((3, 3), (1, 1), {"dead": 4}, False),
+    ],
+)
+def test_it_has_five_living_neighbours_as_a_pad_of_a_glove_is_touched_alone(
+    shape, place, more, is_judged
+):
+    assert bool(changes("A" * 6, shape, place, **more)) == is_judged
