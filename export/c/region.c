@@ -67,7 +67,7 @@ void ec_largest(
   uint16_t best_label = 0;
   uint16_t label = 0;
   for (uint32_t i = 0; i < TAXELS; i++) {
-    active[i] = counts[i] > EC_THRESHOLD_COUNTS && (!valid || valid[i]);
+    active[i] = counts[i] > EC_THRESHOLD_COUNTS && EC_READABLE(valid, i);
     labels[i] = 0;
   }
   for (uint32_t i = 0; i < TAXELS; i++) {

@@ -102,7 +102,7 @@ def outputs(model, point, vector):
 
 def vectors(model, points, recording):
     """As `give_vectors`."""
-    contact = first_contact(recording, model.info.tracker(recording.layout).tracker)
+    contact = first_contact(recording, model.info.tracker(recording.layout))
     if contact is None:
         return np.array([0.0])
     windows_s = [model.decision_points_s[point] for point in points]
