@@ -10,7 +10,15 @@ from joblib import delayed
 from edge.arrays import Booleans, Floats, Integers
 from edge.model.info import margin
 from train.data.vectors import Strings, Vectors
-from train.model.pipeline import Choices, ContactClassifier, Fits, fittable
+from train.model.pipeline import (
+    Choice,
+    Choices,
+    ContactClassifier,
+    Fits,
+    Slopes,
+    fittable,
+    slopes_of,
+)
 from train.threads import in_processes, single_thread
 
 AtPoints = Sequence[Choices]
@@ -55,7 +63,11 @@ def held_out(
 ) -> list[HeldOut]:
     """[run] answers to each trial by models without its fold.
 
-    Runs share the fits of equal settings.
+    Runs share the fits of equal settings. A trial takes no part in the projection and
+    the rows that answer it. It has a part in one number for each task and space, the
+    slope, which is that of all trials: so margins are on the scale of the exported
+    model's, with which its rules and curves work. Slopes of a fold's own trials are
+    smaller and less even, and promise times that the exported model does not keep.
 
     Args:
         vectors: (decision points, n, p).
@@ -64,8 +76,10 @@ def held_out(
         jobs: processes.
         heading: of a progress bar on stderr; empty for none.
     """
+    settings = [at_points for run in runs for at_points in run]
+    slopes = slopes_at_points(settings, vectors, jobs)
     work = [
-        delayed(_fold)(vectors, folds == fold, choices)
+        delayed(_fold)(vectors, folds == fold, choices, slopes)
         for fold, choices in enumerate(zip(*runs, strict=True))
     ]
     by_fold = list(in_processes(jobs, work, heading))
@@ -88,6 +102,7 @@ def _fold(
     vectors: Vectors,
     left_out: Booleans,
     runs: Sequence[AtPoints],
+    slopes: Sequence[Slopes],
 ) -> list[Answers]:
     """[run] answers to the trials that are left out."""
     training = vectors.part(~left_out)
@@ -96,34 +111,61 @@ def _fold(
     with single_thread():
         for choices in runs:
             possible = [fittable(at_point, training.y) for at_point in choices]
-            models = at_points(possible, training, fits)
+            models = at_points(possible, training, fits, slopes)
             by_run.append(answers(models, vectors.X[:, left_out]))
     return by_run
+
+
+def slopes_at_points(
+    settings: Sequence[AtPoints], vectors: Vectors, jobs: int = 1
+) -> list[Slopes]:
+    """[decision point] the slopes of several settings. Points before the last have one
+    slope for each task and space, the mean of theirs.
+
+    Margins of all of them are compared with one threshold. The slope of a single point
+    comes from few trials, and its noise would decide when a rule stops.
+
+    Args:
+        settings: at each point.
+        vectors: (points, n, p) of the trials.
+        jobs: processes.
+    """
+    work = [
+        delayed(_slopes_of)(choices, replace(vectors, X=x))
+        for choices, x in zip(zip(*settings, strict=True), vectors.X, strict=True)
+    ]
+    *early, at_end = in_processes(jobs, work)
+    by_settings: dict[tuple[str, Choice], list[float]] = {}
+    for slopes in early:
+        for key, slope in slopes.items():
+            by_settings.setdefault(key, []).append(slope)
+    means = {key: fmean(values) for key, values in by_settings.items()}
+    return [*[means] * len(early), at_end]
+
+
+def _slopes_of(settings: Sequence[Choices], vectors: Vectors) -> Slopes:
+    """`slopes_of`, in one thread."""
+    with single_thread():
+        return slopes_of(settings, vectors)
 
 
 def at_points(
     choices: AtPoints,
     vectors: Vectors,
     fits: Sequence[Fits],
+    slopes: Sequence[Slopes],
 ) -> list[ContactClassifier]:
-    """The classifiers of decision points, of which those before the last have one slope
-    for each task, the mean of theirs.
-
-    Margins of all of them are compared with one threshold. The slope of a single point
-    comes from few trials, and its noise would decide when a rule stops (cody18:
-    mobility at 0.5 s is wrong in 12.5 % by slopes of their own, in 11.2 % by one).
+    """The classifiers of decision points.
 
     Args:
         choices: at each point.
         vectors: (points, n, p) of the trials.
         fits: at each point, on the same trials, which are taken, and added to.
+        slopes: at each point.
     """
-    models = []
-    for at_point, x, shared in zip(choices, vectors.X, fits, strict=True):
-        models.append(ContactClassifier.of(at_point, replace(vectors, X=x), shared))
-    early = models[:-1]
-    for task in choices[-1]:
-        slopes = [model.tasks_[task].slope for model in early]
-        for model in early:
-            model.tasks_[task] = replace(model.tasks_[task], slope=fmean(slopes))
-    return models
+    return [
+        ContactClassifier.of(at_point, replace(vectors, X=x), shared, of_point)
+        for at_point, x, shared, of_point in zip(
+            choices, vectors.X, fits, slopes, strict=True
+        )
+    ]

@@ -7,7 +7,7 @@ graph down.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
@@ -152,6 +152,9 @@ class Choice:
 
 Choices = Mapping[str, Choice]
 """{task: its settings}."""
+Slopes = Mapping[tuple[str, Choice], float]
+"""{(task, its settings with 1 neighbour): `FittedTask.slope`}, of which the number of
+neighbours is no part."""
 
 
 def fittable(choices: Choices, y: Labels) -> dict[str, Choice]:
@@ -288,6 +291,7 @@ class ContactClassifier:
         choices: Choices,
         vectors: Vectors,
         fits: Fits | None = None,
+        slopes: Slopes | None = None,
     ) -> ContactClassifier:
         """A classifier fitted on some trials.
 
@@ -295,9 +299,10 @@ class ContactClassifier:
             choices: {task: Choice}.
             vectors: the trials; labels are empty where a trial has none.
             fits: on the same trials, which are taken, and added to.
+            slopes: of these settings; those that the trials give where None.
         """
         model = cls(choices, vectors.features, vectors.widths)
-        return model._fit(vectors, {} if fits is None else fits)
+        return model._fit(vectors, {} if fits is None else fits, slopes)
 
     def fit(self, X: Floats, y: Labels) -> ContactClassifier:
         """Fit every task on the trials of X (n, p) that have a label y[task] (n,) for
@@ -308,9 +313,13 @@ class ContactClassifier:
         """
         return self._fit(Vectors(X, y, self.features, self.widths), {})
 
-    def _fit(self, vectors: Vectors, fits: Fits) -> ContactClassifier:
+    def _fit(
+        self, vectors: Vectors, fits: Fits, slopes: Slopes | None = None
+    ) -> ContactClassifier:
         """Fit the tasks that have no fit yet."""
         vectors = replace(vectors, X=finite(vectors.X))
+        if slopes is None:
+            slopes = slopes_of([self.choices], vectors)
         self.n_trials_, self.n_features_in_ = vectors.X.shape
         fitted: dict[str, FittedTask] = {}
         for choices in sharing_a_space(self.choices, vectors):
@@ -318,7 +327,10 @@ class ContactClassifier:
             if key not in fits:
                 fits[key] = fit_together(choices, vectors)
             fitted |= fits[key]
-        self.tasks_ = {task: fitted[task] for task in self.choices}
+        self.tasks_ = {
+            task: replace(fitted[task], slope=slopes[task, replace(choice, k=1)])
+            for task, choice in self.choices.items()
+        }
         self.products_ = factors_of({task: vectors.y[task] for task in self.choices})
         return self
 
@@ -362,14 +374,9 @@ def fit_together(choices: Choices, vectors: Vectors) -> dict[str, FittedTask]:
     """Fit tasks that share a space on the trials that have labels for them."""
     features = next(iter(choices.values())).features
     columns = vectors.columns_of(features)
-    vectors = vectors.of(features)
-    slopes = _slopes(choices, vectors)
-    fitted = _fit_space(choices, vectors)
+    fitted = _fit_space(choices, vectors.of(features))
     space = replace(next(iter(fitted.values())).space, columns=columns)
-    return {
-        task: replace(fit, space=space, slope=slopes[task])
-        for task, fit in fitted.items()
-    }
+    return {task: replace(fit, space=space) for task, fit in fitted.items()}
 
 
 def _fit_space(choices: Choices, vectors: Vectors) -> dict[str, FittedTask]:
@@ -396,6 +403,19 @@ def _fit_space(choices: Choices, vectors: Vectors) -> dict[str, FittedTask]:
         components = min(choice.components, projection.rank_)
         fitted[task] = FittedTask(space, classes, labels, components, choice.k)
     return fitted
+
+
+def slopes_of(settings: Iterable[Choices], vectors: Vectors) -> Slopes:
+    """The slopes of several settings of the tasks, by trials (n, p)."""
+    slopes: dict[tuple[str, Choice], float] = {}
+    for choices in settings:
+        asked = {task: replace(choice, k=1) for task, choice in choices.items()}
+        new = {task: c for task, c in asked.items() if (task, c) not in slopes}
+        for together in sharing_a_space(new, vectors):
+            features = next(iter(together.values())).features
+            measured = _slopes(together, vectors.of(features))
+            slopes |= {(task, new[task]): value for task, value in measured.items()}
+    return slopes
 
 
 def _slopes(choices: Choices, vectors: Vectors) -> dict[str, float]:

@@ -48,7 +48,14 @@ from edge.touch.features import FEATURES
 from train.data.folds import finest, stratified_folds
 from train.data.vectors import Strings, Vectors
 from train.model.curves import Curve, Evidence, cross_fitted
-from train.model.held_out import AtPoints, HeldOut, answers, at_points, held_out
+from train.model.held_out import (
+    AtPoints,
+    HeldOut,
+    answers,
+    at_points,
+    held_out,
+    slopes_at_points,
+)
 from train.model.never_met import (
     SHARE,
     known_of,
@@ -218,9 +225,10 @@ class SequentialClassifier:
         self.columns_ = vectors.columns_of(features)
         self.n_features_in_ = len(self.columns_)
         vectors = vectors.of(features)
+        slopes = slopes_at_points([self.choices_at], vectors, self.jobs)
         with single_thread():
             self.decision_points_ = at_points(
-                self.choices_at, vectors, [{} for _ in vectors.X]
+                self.choices_at, vectors, [{} for _ in vectors.X], slopes
             )
         return vectors
 

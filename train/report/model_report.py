@@ -3,7 +3,7 @@ candidates."""
 
 import re
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -26,7 +26,9 @@ from train.model.pipeline import (
     ContactClassifier,
     Fits,
     FittedTask,
+    Slopes,
     fittable,
+    slopes_of,
 )
 from train.model.projection import MOST_STEPS
 from train.report import page
@@ -78,8 +80,17 @@ class Exported:
     prices: Prices
 
 
-Shared = dict[bytes, Fits]
-"""{numbers of training trials: fits on them}."""
+@dataclass(frozen=True)
+class Shared:
+    """What tasks with the same settings share.
+
+    Attributes:
+        slopes: of the settings, by all trials.
+        fits: {numbers of training trials: fits on them}.
+    """
+
+    slopes: Slopes
+    fits: dict[bytes, Fits] = field(default_factory=dict)
 
 
 def _without_fold(
@@ -89,7 +100,7 @@ def _without_fold(
 ) -> dict[str, tuple[list[Strings], dict[int, Explanation]]]:
     """{task: the results of `_left_out`} of tasks with the same settings, which share
     their fits, from {task: its left-out trials}."""
-    shared: Shared = {}
+    shared = Shared(slopes_of([choices], vectors))
     return {
         task: _left_out(vectors, task, choices, test, shared)
         for task, test in tests.items()
@@ -111,7 +122,7 @@ def _left_out(
         task: the task to answer.
         choices: each task's settings, chosen without the left-out trials.
         test: the left-out trials.
-        shared: fits that are taken, and added to.
+        shared: whose fits are taken, and added to.
     """
     labels = vectors.y[task]
     classes, index = np.unique(labels, return_inverse=True)
@@ -126,8 +137,8 @@ def _left_out(
         train = training[quarter_of <= quarter]
         fewer = vectors.part(train)
         possible = fittable(choices, fewer.y)
-        fits = shared.setdefault(train.tobytes(), {})
-        model = ContactClassifier.of(possible, fewer, fits)
+        fits = shared.fits.setdefault(train.tobytes(), {})
+        model = ContactClassifier.of(possible, fewer, fits, shared.slopes)
         answers.append(model.tasks_[task].classes[model.decide(X)[task].labels])
     _, voters = model.tasks_[task].neighbours(X)
     space = _space(model.tasks_[task], index[train])
