@@ -62,10 +62,11 @@ def early(measured: Measured) -> Section:
         "Early decisions",
         [
             "With a requested error rate, the model decides as soon as it is sure "
-            "enough. The export that certifies the rates tests this on each contact "
-            "with a model of other contacts. Rates that it does not certify have no "
-            "row. A contact unlike all trained ones waits for the full window. A thing "
-            "that is unknown gets no name, which counts as wrong.",
+            "enough. The mean times are those that the export of all contacts promises; "
+            "rates that it does not certify have no row. Exports without a fifth of the "
+            "contacts, or of the objects, decide these by its rules. A contact unlike "
+            "all trained ones waits for the full window. A thing that is unknown gets no "
+            "name, which counts as wrong.",
         ],
         [Table("early", "Decisions with a requested error rate", rows, narrow=4)],
     )
@@ -146,8 +147,7 @@ GLOSSARY = {
         "this paired difference."
     ),
     "unseen objects": (
-        "The accuracy if all trials of an object are held out together. Early decisions "
-        "then have the settings and models of the other objects, and the rules of all."
+        "The accuracy if all trials of an object are held out together."
     ),
     "confidence": (
         "The calibrated probability that the label is right, if the thing is one of "

@@ -1,27 +1,29 @@
 """Early decisions with certified error rates, of known objects and of unseen ones.
 
-Of known objects the figures are those by which an export certifies its rules
-(`train.model.stopping`), so that its file keeps them. Of unseen objects they come from
-exports without these objects, which decide by the same rules.
+The rules, their certified errors and their mean times are those of the export of all
+contacts, which its file keeps. How often they decide rightly is tested on contacts, and
+on entire objects, by exports without them.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
-from edge.arrays import Booleans, Floats
+from edge.arrays import Booleans, Integers
 from edge.early import fastest
 from edge.model.info import Stopping
 from train.choose.evaluate import Promise, Result
 from train.data.dataset import DataSet
+from train.data.folds import finest, stratified_folds
 from train.data.groups import LEAVE_OUT, TRIAL, groups_of
 from train.fitting import fit
 from train.model.rules import Course, candidates
 from train.report.score import paired
 from train.report.work import Workers
 
+FOLDS = 5
 ERRORS = (0.05, 0.1, 0.15, 0.2, 0.25, 0.3)
 
 
@@ -31,24 +33,19 @@ class Certified:
 
     Attributes:
         error: the requested rate.
-        right: (n,) whether each contact is decided rightly. A thing that is unknown gets
-            no name, which counts as wrong.
+        mean_s: mean time to decision, which the exported model promises.
+        right: (n,) whether each contact is decided rightly by a model without it. A
+            thing that is unknown gets no name, which counts as wrong.
         waited: (n,) whether the same contact is decided rightly at the full window.
-        seconds: (n,) time of each decision.
-        unseen: (m,) whether each contact is decided rightly by a model that has not met
-            the object; None where no objects could be left out.
+        unseen: (m,) whether each contact is decided rightly by a model without its
+            object; None where no objects could be left out.
     """
 
     error: float
+    mean_s: float
     right: Booleans
     waited: Booleans
-    seconds: Floats
     unseen: Booleans | None = None
-
-    @property
-    def mean_s(self) -> float:
-        """Mean time to decision."""
-        return float(self.seconds.mean())
 
     @property
     def result(self) -> Result:
@@ -85,7 +82,7 @@ def certified(
         jobs: processes.
     """
     y = {task: dataset.labels(task) for task in dataset.tasks}
-    options: dict[str, Any] = {
+    options = {
         "leave_out": TRIAL,
         "decision_points_s": decision_points_s,
         "tasks": tuple(y),
@@ -93,25 +90,54 @@ def certified(
     }
     model = fit(dataset, **options, jobs=jobs).sequential
     assert model is not None
-    left_out: dict[str, Course] = {}
+    folds = stratified_folds(y[finest(y)], FOLDS)
+    known = left_out(dataset, folds, options, jobs)
+    unseen: dict[str, LeftOut] = {}
     groups = groups_of(dataset, y, LEAVE_OUT, quick=True)
     if groups is not None:
-        folds = [groups.folds == fold for fold in np.unique(groups.folds)]
-        cases = [(dataset, test, options) for test in folds]
-        courses = Workers(jobs).map("unseen objects", _without, cases)
-        for task in groups.tasks:
-            left_out[task] = _joined([of_fold[task] for of_fold in courses])
-    seconds = np.array(decision_points_s)
+        by_task = left_out(dataset, groups.folds, options, jobs)
+        unseen = {task: by_task[task] for task in groups.tasks}
     return {
-        task: at_errors(model.courses_[task], stopping, seconds, left_out.get(task))
+        task: at_errors(stopping, known[task], unseen.get(task))
         for task, stopping in model.stopping_.items()
     }
 
 
+@dataclass(frozen=True)
+class LeftOut:
+    """A task's decisions by models that were fitted without what they decide.
+
+    Attributes:
+        right: (decision points, n) whether each fixed window's label is right.
+        course: the same with confidences, which tell when a rule decides.
+    """
+
+    right: Booleans
+    course: Course
+
+
+def left_out(
+    dataset: DataSet, folds: Integers, options: Mapping[str, Any], jobs: int
+) -> dict[str, LeftOut]:
+    """{task: decisions of the trials of each fold (n,) by an export of the others}.
+
+    Args:
+        dataset: the trials.
+        folds: of trials, or of entire groups of them.
+        options: of the export.
+        jobs: processes.
+    """
+    cases = [(dataset, folds == fold, options) for fold in np.unique(folds)]
+    of_folds = Workers(jobs).map("deciding early", _without, cases)
+    return {
+        task: _joined([of_fold[task] for of_fold in of_folds]) for task in of_folds[0]
+    }
+
+
 def _without(
-    dataset: DataSet, test: Booleans, options: dict[str, Any]
-) -> dict[str, Course]:
-    """{task: the course of some trials}, by an export of the others."""
+    dataset: DataSet, test: Booleans, options: Mapping[str, Any]
+) -> dict[str, LeftOut]:
+    """{task: the decisions of some trials by an export of the others}."""
     fitted = fit(dataset.part(~test), **options, jobs=1)
     model = fitted.sequential
     assert model is not None
@@ -120,47 +146,47 @@ def _without(
     points = model.decision_points_s
     new = np.stack([test_set.features(s, fitted.samples, names) for s in points])
     truth = {task: test_set.labels(task) for task in model.choices}
-    _, _, courses = model.judged(new, truth)
-    return courses
+    right, _, courses = model.judged(new, truth)
+    return {task: LeftOut(right[task], course) for task, course in courses.items()}
 
 
-def _joined(courses: Sequence[Course]) -> Course:
-    """The course of several folds together."""
+def _joined(folds: Sequence[LeftOut]) -> LeftOut:
+    """The decisions of several folds together."""
+    courses = [fold.course for fold in folds]
     confidences = zip(*(course.confidences for course in courses), strict=True)
     wrong = zip(*(course.wrong for course in courses), strict=True)
-    return Course(
+    withheld = [course.withheld for course in courses if course.withheld is not None]
+    course = Course(
         confidences=list(map(np.hstack, confidences)),
         wrong=list(map(np.hstack, wrong)),
         unusual=np.hstack([course.unusual for course in courses]),
+        withheld=np.hstack(withheld) if withheld else None,
     )
+    return LeftOut(np.hstack([fold.right for fold in folds]), course)
 
 
 def at_errors(
-    course: Course,
-    stopping: Stopping,
-    seconds: Floats,
-    left_out: Course | None = None,
+    stopping: Stopping, known: LeftOut, unseen: LeftOut | None = None
 ) -> list[Certified]:
     """The decisions at each error rate that a model certifies; one rule that serves
     several rates stands at the smallest.
 
     Args:
-        course: of known objects.
         stopping: the model's rules.
-        seconds: (points,) windows.
-        left_out: the course of unseen objects.
+        known: decisions of known objects.
+        unseen: those of objects that were left out.
     """
-    waiting, _ = candidates(len(seconds))
-    _, late = course.under(waiting)
+    waiting, _ = candidates(len(known.right))
+    _, late = known.course.under(waiting)
     rules = {fastest(stopping, error): error for error in reversed(ERRORS)}
     decisions = []
     for rule, error in reversed(rules.items()):
         if rule is None:
             continue
-        at, wrong = course.under(rule)
-        unseen = None
-        if left_out is not None:
-            _, missed = left_out.under(rule)
-            unseen = ~missed
-        decisions.append(Certified(error, ~wrong, ~late, seconds[at], unseen))
+        _, wrong = known.course.under(rule)
+        right = None
+        if unseen is not None:
+            _, missed = unseen.course.under(rule)
+            right = ~missed
+        decisions.append(Certified(error, rule.mean_s, ~wrong, ~late, right))
     return decisions
