@@ -61,16 +61,16 @@ def domains(recordings, count):
         yield Path(folder).name, *halves(folder), None
 
 
-def flagged(domain, model, rows):
-    """A row for each flag that answers of a domain have, from its `decisions`."""
+def met(model, rows):
+    """The rows of tasks whose labels the model knows."""
     tasks = model.info.tasks.items()
-    labels = {task: set(of_task.labels) for task, of_task in tasks}
-    met = {
-        task
-        for task, truth in zip(rows["task"], rows["truth"], strict=True)
-        if truth in labels[task]
-    }
-    rows = rows[rows["task"].isin(met)]
+    known = {(task, label) for task, of_task in tasks for label in of_task.labels}
+    shared = known.intersection(zip(rows["task"], rows["truth"], strict=True))
+    return rows[rows["task"].isin([task for task, _ in shared])]
+
+
+def flagged(domain, rows):
+    """A row for each flag that answers of a domain have, from its `decisions`."""
     named = [decision and decision.label for decision in rows["decision"]]
     wrong = named != rows["truth"]
     for flag in FLAGS:
@@ -90,7 +90,7 @@ def measure(recordings, count):
     """Measure, and write the table."""
     rows = []
     for domain, model, touches, error in domains(recordings, count):
-        rows += flagged(domain, model, decisions(model, touches, error))
+        rows += flagged(domain, met(model, decisions(model, touches, error)))
     rows.sort(key=lambda row: list(FLAGS).index(row["flag"]))
     tables.write("flags", [rows], "make flags")
 

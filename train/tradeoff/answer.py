@@ -90,7 +90,7 @@ def prices(measured: Measured) -> Section:
     return Section(
         "The price of a wrong decision",
         [
-            "In this table a wrong decision "
+            "In this table a wrong decision about a known object "
             f"costs {measured.wrong:g}, and waiting for a second costs "
             f"{measured.second:g}. Give your own prices with `{command}`. The best of "
             "several uses looks a little better than it is, because chance helped to "
