@@ -76,8 +76,6 @@ class Uncertified:
         """The model's answer at the last decision point."""
         if point < len(self._info.decision_points_s) - 1:
             return None
-        if candidate.task in self._info.products:
-            candidate = paired(self._info, candidate, decided)
         return candidate.flagged(uncertified=True)
 
 

@@ -27,6 +27,7 @@ from edge.touch import measures
 from edge.touch.features import WINDOW_S
 from edge.writing import check_writable
 from export.api import measure, save
+from train.choose.choose import SECOND_WORTH
 from train.choose.decision_points import MOST_TRIALS
 from train.data.dataset import read
 from train.data.feature_sets import SETS
@@ -43,7 +44,7 @@ FIXED = ("features", "projection", "scaling", "components", "k", "window", "task
 """Options that would make another model than the one that a point was measured with."""
 FORWARDED = (
     "features projection scaling components k tasks leave_out threshold onset "
-    "release jobs"
+    "release jobs second_worth"
 ).split()
 """Options that `fit` takes as they are."""
 DECISION_POINTS = "0.2:1.2:0.1"
@@ -114,6 +115,12 @@ OPTIONS: dict[str, dict[str, Any]] = {
         "help": "seconds from onset that a decision is based on (default: "
         f"{WINDOW_S:g}, or more if touches last longer and a longer window is much more "
         "accurate)",
+    },
+    "--second-worth": {
+        "type": within(float, 0.0, 1.0),
+        "default": SECOND_WORTH,
+        "help": "accuracy that a second of waiting is worth where the window is chosen "
+        "(default: %(default)g)",
     },
     "--decision-points": {
         "metavar": "A:B:STEP",
@@ -191,8 +198,7 @@ def parser() -> argparse.ArgumentParser:
         prog="edge-classify export",
         description="Fits a model for every task that the recordings' labels share, and writes "
         "OUT/model.onnx and OUT/golden.npz. Options you give are held fixed. The "
-        "others are chosen for each task: the smallest model within one standard error "
-        "of the best in cross-validation.",
+        "others are chosen by cross-validation.",
     )
     for names, settings in OPTIONS.items():
         top.add_argument(*names.split(), **settings)

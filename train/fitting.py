@@ -82,12 +82,11 @@ class Fitted:
 def fit(data: DataSet | str | Path | Sequence[str | Path], **options: Any) -> Fitted:
     """Choose and fit every task of some recordings.
 
-    Options you pass are held fixed. The others are chosen for each task among the
-    candidates of `train.choose.choose`: the features and projection of the smallest model
-    within one standard error of the best in cross-validation (the one whose
-    answers have the best grades where fewer than 200 single trials are left out, see
-    `train.choose.answers`), with the scaling, shrinkage, components and k that are best
-    there.
+    Options you pass are held fixed. The others are chosen among the candidates of
+    `train.choose.candidates`, as `train.choose.protocols` says: for tasks whose groups
+    are left out together, by the accuracy with trials and with groups left out; for
+    others each the smallest model within one standard error of the best in
+    cross-validation (the best where there are fewer than 200 trials).
 
     Args:
         data: recordings, folders of them, or a data set that was loaded for the
@@ -100,6 +99,7 @@ def fit(data: DataSet | str | Path | Sequence[str | Path], **options: Any) -> Fi
         window_s: seconds from onset. Where None it is `WINDOW_S`, or twice that and so
             on where touches last so long and accuracy rises enough
             (`Choosing.window`).
+        second_worth: accuracy that is worth a second of waiting.
         samples: values of a feature.
         tasks: keys of the labels; all that the recordings share where None.
         leave_out: label whose groups are left out to choose the settings of a task and
@@ -191,7 +191,7 @@ def choose(loaded: Loaded, y: Labels, options: FitOptions) -> Settings:
         windows = windows_of(
             [float(t.recording.t[-1]) - t.onset_s for t in dataset.trials]
         )
-    window_s, notes = choosing.window(windows)
+    window_s, notes = choosing.window(windows, options.second_worth)
     settings = replace(choosing.choose(window_s), notes=notes)
     if options.quick or not has_early_points(settings, options):
         return settings

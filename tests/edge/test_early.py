@@ -51,14 +51,11 @@ def answered(first, second, stops=("confidence",) * 2, rule=SURE):
     return policy.answer(CANDIDATE, 1, factors(first, second, stops))
 
 
-def test_a_product_that_is_not_certified_has_its_factors_labels_at_the_last_point():
-    info = SimpleNamespace(
-        tasks=TASKS, products={"category"}, decision_points_s=(0.6, 1.2)
-    )
-    decided = factors("y", "b", ("window", "window"))
-    assert Uncertified(info).answer(CANDIDATE, 0, decided) is None
-    answer = Uncertified(info).answer(CANDIDATE, 1, decided)
-    assert answer.label == answer.decision.label == "y-b"
+def test_a_task_that_is_not_certified_is_decided_at_the_last_point():
+    policy = Uncertified(SimpleNamespace(decision_points_s=(0.6, 1.2)))
+    assert policy.answer(CANDIDATE, 0, {}) is None
+    answer = policy.answer(CANDIDATE, 1, {})
+    assert answer.label == "x-a"
     assert "uncertified" in answer.flags
 
 

@@ -35,6 +35,7 @@ WITH_JOINTS = (
     ("moments", "joints"),
     ("contact", "moments", "joints"),
     ("contact", "sqrt_joints"),
+    ("sqrt_joints",),
     ("taxels",),
     ("sqrt_taxels",),
     ("contact", "joints", "posture"),
@@ -43,7 +44,8 @@ WITH_JOINTS = (
     ("moments", "zone_kernels", "joints"),
 )
 """Those for recordings with joint angles, whose changes show how far the thing gave
-way."""
+way. The arm tells that a thing has begun to move before the skin does, and roots let a
+small motion count."""
 WITH_SHEAR = (
     ("contact", "shear"),
     ("moments", "shear"),
@@ -61,14 +63,6 @@ OF_SKIN = (
 OF_JOINTS = (("joints",), ("joints", "posture"))
 """For known things, each of `OF_SKIN` is a candidate with each of these, and with shear
 and without, where the recordings have them."""
-EARLY_WITH_JOINTS = {
-    ("contact", "sqrt_joints"): BY_COLUMN,
-    ("sqrt_joints",): "IV",
-}
-"""Those tried at early decision points of recordings with joint angles, and their
-scaling. The arm tells that a thing has begun to move before the skin does. Roots let a
-small motion count. Beside other features a motion that begins counts as much as a large
-one only where every column has its own scale."""
 DRAWN = ("contact",)
 DRAWN_WITH_JOINTS = ("contact", "joints")
 """The combination tried for touches of simulated things that are drawn from kinds
@@ -97,31 +91,18 @@ class Candidate:
         sets: names of feature sets and of single features.
         projection: one of `train.model.projection.KINDS`.
         grids: the settings tried with them.
-        full: whether it is tried at the full window.
-        early: its scaling at early decision points; empty where it is not tried there.
         known: whether it is tried for known things alone, where no groups are left out.
     """
 
     sets: tuple[str, ...]
     projection: str
     grids: tuple[SearchGrid, ...]
-    full: bool = True
-    early: str = ""
     known: bool = False
 
     @property
     def name(self) -> str:
         """The names of its features, as `--features` takes them."""
         return " ".join(self.sets)
-
-
-def known_products(y: Labels) -> dict[str, tuple[str, str]]:
-    """{product: its factors}, where every trial with the one has labels of both."""
-    return {
-        task: factors
-        for task, factors in products(y).items()
-        if all((y[factor][y[task] != ""] != "").all() for factor in factors)
-    }
 
 
 def features_of(candidates: Sequence[Candidate]) -> tuple[str, ...]:
@@ -178,25 +159,17 @@ def candidates(
     neighbours. Where `kinds_of` names kinds (`drawn`) only what carries over to other
     skins and arms is tried.
     """
-    mode = Mode.drawn(joints) if drawn else Mode.usual(joints, shear, quick)
+    mode = Mode.drawn(joints) if drawn else Mode.all_others(joints, shear, quick)
     mode = mode.asked(fixed)
     projections = KINDS if fixed.projection is None else (fixed.projection,)
-    every = dict.fromkeys((*mode.full, *mode.early, *mode.known))
+    every = dict.fromkeys((*mode.usual, *mode.known))
     combinations = []
     for sets, kind in product(every, projections):
         if fixed.asks or mode.tries(kind, sets):
             grid = _grid(sets, kind, fixed, mode)
-            grids = _scaled(_with_targets(grid, y, mode), sets, fixed)
-            early = mode.early.get(sets, "")
-            candidate = Candidate(
-                sets,
-                kind,
-                grids,
-                full=sets in (*mode.full, *mode.known),
-                early=early and (fixed.scaling or early),
-                known=sets not in (*mode.full, *mode.early),
-            )
-            combinations.append(candidate)
+            grids = _scaled(_with_targets(grid, y, mode), sets, fixed, mode)
+            known = sets not in mode.usual
+            combinations.append(Candidate(sets, kind, grids, known))
     return combinations
 
 
@@ -205,9 +178,7 @@ class Mode:
     """The candidates that are tried by default.
 
     Attributes:
-        full: feature sets that are tried together at the full window.
-        early: {those of early decision points: their scaling}; none where these have the
-            settings of the full window.
+        usual: feature sets that are tried together.
         known: those that are tried for known things besides.
         shrinkages: of discriminants.
         components: numbers of coordinates.
@@ -216,8 +187,7 @@ class Mode:
         together: try the discriminants of all tasks side by side.
     """
 
-    full: Sequence[tuple[str, ...]]
-    early: Mapping[tuple[str, ...], str]
+    usual: Sequence[tuple[str, ...]]
     known: Sequence[tuple[str, ...]]
     shrinkages: tuple[float, ...]
     components: tuple[int, ...]
@@ -229,8 +199,7 @@ class Mode:
     def drawn(cls, joints: bool) -> Mode:
         """The mode of things that a scene drew from kinds."""
         return cls(
-            full=[DRAWN_WITH_JOINTS if joints else DRAWN],
-            early={},
+            usual=[DRAWN_WITH_JOINTS if joints else DRAWN],
             known=[],
             shrinkages=DRAWN_SHRINKAGES,
             components=DRAWN_COMPONENTS,
@@ -240,15 +209,13 @@ class Mode:
         )
 
     @classmethod
-    def usual(cls, joints: bool, shear: bool, quick: bool) -> Mode:
+    def all_others(cls, joints: bool, shear: bool, quick: bool) -> Mode:
         """The mode of all others, or of a quick choice."""
         usual = WITH_JOINTS if joints else PLAIN
         angles = ("joints",) if joints else ()
         sheared = [(*sets, *angles) for sets in WITH_SHEAR] if shear else []
-        early = EARLY_WITH_JOINTS | dict.fromkeys(sheared, BY_COLUMN)
         return cls(
-            full=[*usual[: QUICK if quick else None], *sheared],
-            early=early if joints and not quick else {},
+            usual=[*usual[: QUICK if quick else None], *sheared],
             known=[] if quick else _beside_every_other(joints, shear),
             shrinkages=QUICK_SHRINKAGES if quick else SHRINKAGES,
             components=COMPONENTS,
@@ -261,8 +228,8 @@ class Mode:
         """The same mode, with the features that are asked for in place of others."""
         if not fixed.asks:
             return self
-        full = self.full if fixed.features is None else [tuple(fixed.features)]
-        return replace(self, full=full, early={}, known=[])
+        usual = self.usual if fixed.features is None else [tuple(fixed.features)]
+        return replace(self, usual=usual, known=[])
 
     def tries(self, kind: str, sets: Sequence[str]) -> bool:
         """Whether a projection of some feature sets is tried by default.
@@ -274,7 +241,7 @@ class Mode:
         """
         if sets == ("paper",):
             return kind == "pca"
-        return kind == "lda" or (self.components_alone and sets in self.full)
+        return kind == "lda" or (self.components_alone and sets in self.usual)
 
 
 def _beside_every_other(joints: bool, shear: bool) -> list[tuple[str, ...]]:
@@ -302,33 +269,38 @@ def _grid(sets: tuple[str, ...], kind: str, fixed: Fixed, mode: Mode) -> SearchG
 
 
 def _with_targets(grid: SearchGrid, y: Labels, mode: Mode) -> list[SearchGrid]:
-    """A grid, and those of discriminants of several tasks side by side."""
-    grids = [grid]
-    if grid.projection == "pca":
-        return grids
-    pairs = known_products(y)
-    for task, factors in pairs.items():
-        grids.append(replace(grid, targets=factors, tasks=(task,)))
-    complete = [task for task in sorted(y) if (y[task] != "").all()]
-    together = tuple(task for task in complete if task not in pairs)
-    if mode.together and len(together) > 1:
-        grids.append(replace(grid, targets=together))
-    return grids
+    """A grid, and that of the discriminants of all tasks side by side."""
+    complete = {task: labels for task, labels in y.items() if (labels != "").all()}
+    if grid.projection == "pca" or not mode.together or len(complete) < 2:
+        return [grid]
+    pairs = products(complete)
+    together = tuple(task for task in sorted(complete) if task not in pairs)
+    return [grid, replace(grid, targets=together)]
 
 
 def _scaled(
     grids: Sequence[SearchGrid],
     sets: Sequence[str],
     fixed: Fixed,
+    mode: Mode,
 ) -> tuple[SearchGrid, ...]:
-    """The grids with each method of scaling that is tried."""
-    methods: Sequence[str] = ("IV",)
-    if fixed.scaling is not None:
-        methods = (fixed.scaling,)
-    elif sets == ("paper",) and fixed.thorough(grids[0].projection):
-        methods = PAPER_SCALINGS
-    scaled = product(methods, grids)
-    return tuple(replace(grid, scaling=method) for method, grid in scaled)
+    """The grids with each method of scaling that is tried.
+
+    Beside other features a motion of the arm that begins counts as much as a large one
+    only where every column has its own scale.
+    """
+    of_joints = any("joints" in name for name in sets)
+    scaled = []
+    for grid in grids:
+        methods: Sequence[str] = ("IV",)
+        if fixed.scaling is not None:
+            methods = (fixed.scaling,)
+        elif sets == ("paper",) and fixed.thorough(grid.projection):
+            methods = PAPER_SCALINGS
+        elif grid.targets and sets in mode.usual and of_joints:
+            methods = ("IV", BY_COLUMN)
+        scaled += [replace(grid, scaling=method) for method in methods]
+    return tuple(scaled)
 
 
 def costs(choices: Sequence[Choice], widths: Mapping[str, int]) -> Integers:

@@ -1,6 +1,6 @@
 """The choice among the candidates, by nested cross-validation."""
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 
@@ -9,25 +9,13 @@ import numpy as np
 from edge.arrays import Booleans, Floats, Integers
 from train.choose.candidates import Candidate
 from train.choose.early import by_folds, early_options, points_of, settle_early
-from train.choose.evaluate import (
-    AnswerTable,
-    Promise,
-    Result,
-    evaluate,
-    fits,
-)
-from train.choose.protocols import (
-    GroupsLeftOut,
-    TrialsLeftOut,
-    promised,
-    rule_among,
-)
-from train.choose.rule import Rule
+from train.choose.evaluate import Halving, Promise, Result, evaluate, fits
+from train.choose.protocols import Protocol, Protocols, promised, rule_among
+from train.choose.rule import MOST_ACCURATE, Rule
 from train.choose.search import SearchGrid
 from train.choose.settings import Chosen, Settings
 from train.data.dataset import DataSet
 from train.data.groups import TRIAL, Divisions, Groups
-from train.data.leaks import late_share
 from train.data.vectors import Labels, Vectors
 from train.model.agreement import families
 from train.model.held_out import held_out
@@ -35,18 +23,8 @@ from train.model.pipeline import Choice, Choices
 from train.model.stopping import Early
 from train.progress import bar
 
-UNSEEN_SHRINKAGE = 0.1
-"""Smallest shrinkage tried where entire groups are left out. Less shrinkage relies on
-differences that are small beside the features' spread, which do not carry over to new
-objects."""
-TOGETHER_SHRINKAGES = (0.01, 0.1)
-"""Least and most for the discriminants of all tasks side by side, which hold for new
-objects too with less (cody18: softness of objects left out is wrong in 13 % with 0.01,
-in 20 % by a discriminant of its own)."""
-WINDOW_MARGIN = 0.02
-"""Accuracy that is not worth twice the wait."""
-MOST_LATE = 0.5
-"""Share of late touches above which the most accurate window is taken."""
+SECOND_WORTH = 0.005
+"""Accuracy that is worth a second of waiting."""
 
 
 Plan = tuple[Integers, Sequence[Choices]]
@@ -59,7 +37,7 @@ class Choosing:
     Args:
         dataset: measured for every candidate.
         y: {task: (n,) labels}.
-        candidates: those of early decision points among them.
+        candidates: what is tried.
         divisions: the trials that are left out together.
         samples: values of a feature.
         jobs: processes.
@@ -78,10 +56,7 @@ class Choosing:
     ) -> None:
         self._dataset = dataset
         self._y = y
-        self.candidates = [candidate for candidate in candidates if candidate.full]
-        self._early_candidates = [
-            candidate for candidate in candidates if candidate.early
-        ]
+        self.candidates = candidates
         self._divisions = divisions
         self._groups = divisions.groups
         self._samples = samples
@@ -89,44 +64,43 @@ class Choosing:
         self._progress = progress
         self._widths = dict(zip(dataset.names, dataset.widths(samples), strict=True))
         self._is_few = bool(divisions.further)
-        self._rule_of_groups = partial(rule_among, widths=self._widths)
-        self._rule_of_trials = partial(self._rule_of_groups, is_few=self._is_few)
+        self._sharing: Sequence[str] = ()
+        if self._groups is not None:
+            self._sharing = _grouped_tasks(self._groups, y)
 
-    def _is_grouped(self, task: str) -> bool:
-        """Whether entire groups are left out for a task."""
-        return self._groups is not None and task in self._groups.tasks
+    def _rule(self, task: str, choices: Sequence[Choice]) -> Rule:
+        """The rule of a task's choice."""
+        if task in self._sharing:
+            return MOST_ACCURATE
+        return rule_among(choices, self._widths, self._is_few)
 
     def _vectors(self, window_s: float) -> Vectors:
         """The trials at a window."""
         dataset = self._dataset.with_kernels(window_s)
         return dataset.vectors(window_s, self._samples, self._y)
 
-    def _tables(
-        self,
-        vectors: Vectors,
-        candidates: Sequence[Candidate],
-        what: str,
-        *,
-        nested: bool,
-    ) -> tuple[AnswerTable, AnswerTable]:
-        """The candidates' answers to left-out trials, and to left-out groups where
-        there are any, each of the tasks that are chosen by them.
-
-        Without groups, both are the answers to left-out trials.
-        """
+    def _protocols(self, vectors: Vectors, heading: str, *, nested: bool) -> Protocols:
+        """The choices by the candidates' answers to what is left out."""
         folds = self._divisions.folds
         further_folds = self._divisions.further
-        grouped = [task for task in self._y if self._is_grouped(task)]
-        alone = {*self._y}.difference(grouped)
-        by_trial = for_tasks(candidates, alone, graded=self._is_few and nested)
+        grids = [grid for candidate in self.candidates for grid in candidate.grids]
+        carried_over = [c for c in self.candidates if not c.known]
+        unseen = _side_by_side([grid for c in carried_over for grid in c.grids])
+        alone = [task for task in sorted(self._y) if task not in self._sharing]
+        sharing_in = dict.fromkeys(unseen, self._sharing)
+        by_trial = []
+        for grid in grids:
+            graded = self._is_few and nested
+            by_trial += for_tasks(grid, alone, graded=graded)
+            by_trial += for_tasks(grid, sharing_in.get(grid, ()))
         total = fits(folds, nested)
         total += sum(fits(division, False) for division in further_folds)
         if self._groups is not None:
             total += fits(self._groups.folds, nested)
-        # One bar for both tables, so that the time left is that of the whole choice.
+        # One bar for both protocols, so that the time left is that of the whole choice.
         with bar(
             total=total,
-            desc=what,
+            desc=heading,
             unit=" fits",
             disable=not self._progress,
         ) as progress:
@@ -135,34 +109,33 @@ class Choosing:
                 vectors,
                 jobs=self._jobs,
                 progress=progress.update,
+                halving=Halving(self._rule, self._sharing),
             )
-            rules = self._rule_of_trials
-            trials = answers(folds, by_trial, nested=nested, halve=rules)
+            trials = answers(folds, by_trial, nested=nested)
             further = [
-                answers(division, by_trial, nested=False, halve=rules)
-                for division in further_folds
+                answers(division, by_trial, nested=False) for division in further_folds
             ]
             trials = replace(trials, repeated=tuple(further))
+            by_trials = Protocol(trials, self._rule)
             if self._groups is None:
-                return trials, trials
-            carried_over = [c for c in candidates if not c.known]
-            grouped_tasks = _grouped_tasks(self._groups, self._y)
-            unseen = _unseen(self._groups, for_tasks(carried_over, grouped_tasks))
-            rules = self._rule_of_groups
-            groups = answers(self._groups.folds, unseen, nested=nested, halve=rules)
-        return trials, groups
+                return Protocols(by_trials)
+            by_group = [g for grid in unseen for g in for_tasks(grid, self._sharing)]
+            groups = answers(self._groups.folds, by_group, nested=nested)
+        shared = replace(by_trials, beside=groups, sharing=self._sharing)
+        by_groups = replace(shared, table=groups, groups=self._groups, beside=trials)
+        return Protocols(by_trials, by_groups, shared)
 
     def _right(self, window_s: float) -> dict[str, Floats]:
         """{task: the shares of right answers to each trial, of the candidate that is
         best in plain cross-validation}."""
         vectors = self._vectors(window_s)
-        what = f"{window_s:g} s"
-        trials, groups = self._tables(vectors, self.candidates, what, nested=False)
+        protocols = self._protocols(vectors, f"{window_s:g} s", nested=False)
         right: dict[str, Floats] = {}
         for task in self._y:
-            table = groups if self._is_grouped(task) else trials
-            answers = table.plain(task)[:, table.tested[task]]
-            right[task] = answers[Rule().choose(answers)]
+            protocol = protocols.of(task)
+            tested = protocol.table.tested[task]
+            place = MOST_ACCURATE.choose(protocol.answers(task)[:, tested])
+            right[task] = protocol.answers(task, shared=False)[place, tested]
         return right
 
     def accuracy(self, window_s: float) -> float:
@@ -175,12 +148,15 @@ class Choosing:
             accuracies.append(promised(result, untouched).accuracy)
         return sum(accuracies) / len(accuracies)
 
-    def window(self, windows: Sequence[float]) -> tuple[float, list[str]]:
-        """The shortest of some windows at which every task is about as accurate as at
-        its best; the best one where most touches are late.
+    def window(
+        self, windows: Sequence[float], second_worth: float = SECOND_WORTH
+    ) -> tuple[float, list[str]]:
+        """The window with the best mean accuracy of the tasks in plain cross-validation,
+        less what the wait is worth.
 
-        A task may lose a standard error, or `WINDOW_MARGIN`. A robot waits for the
-        answer to a touch, but not to one that began before the recording.
+        Args:
+            windows: in seconds, rising.
+            second_worth: accuracy that is worth a second of waiting.
 
         Returns:
             The window in seconds, and sentences that say why, and what a longer one
@@ -189,17 +165,13 @@ class Choosing:
         if len(windows) == 1:
             return windows[0], []
         by_window = [self._right(window_s) for window_s in windows]
-        shortest = Rule(np.arange(len(windows)), margin=WINDOW_MARGIN)
-        place = 0
-        means = {}
-        for task in self._y:
-            right = np.array([answers[task] for answers in by_window])
-            place = max(place, shortest.choose(right))
-            means[task] = right.mean(axis=1)
-        reason = f"as the touches last longer than {windows[0]:g} s"
-        if late_share(self._dataset) > MOST_LATE:
-            place = int(np.mean(list(means.values()), axis=0).argmax())
-            reason = "the most accurate, as most touches begin before their recording"
+        means = {
+            task: np.array([right[task].mean() for right in by_window])
+            for task in self._y
+        }
+        worth = np.mean(list(means.values()), axis=0)
+        worth -= second_worth * np.array(windows)
+        place = int(worth.argmax())
         shares = []
         gains = []
         for task, of_task in means.items():
@@ -208,33 +180,31 @@ class Choosing:
                 f"{task} {', '.join(f'{a:.0%} at {w:g} s' for a, w in accuracies)}"
             )
             best = int(of_task.argmax())
-            if best > place and of_task[best] - of_task[place] > WINDOW_MARGIN:
+            if best > place:
                 gains.append(
                     f"--window {windows[best]:g}: {task} {of_task[best]:.0%} instead of "
                     f"{of_task[place]:.0%} in cross-validation"
                 )
-        note = f"the window is {windows[place]:g} s, {reason}; in cross-validation "
+        note = (
+            f"the window is {windows[place]:g} s: a second of waiting counts as "
+            f"{100 * second_worth:g} points of accuracy; in cross-validation "
+        )
         return windows[place], [f"{note}{'; '.join(shares)} (--window sets it)", *gains]
 
     def choose(self, window_s: float) -> Settings:
         """Each task's settings."""
         vectors = self._vectors(window_s)
-        tables = self._tables(vectors, self.candidates, "choosing", nested=True)
-        trials = TrialsLeftOut(tables[0], self._widths, self._is_few)
-        groups = None
-        if self._groups is not None:
-            groups = GroupsLeftOut(tables[1], self._widths, groups=self._groups)
+        protocols = self._protocols(vectors, "choosing", nested=True)
+        trials, groups = protocols.trials, protocols.groups
         chosen = {}
-        of_task = {}
+        without_trials = {}
         for task in self._y:
-            protocol = trials
-            if groups is not None and self._is_grouped(task):
-                protocol = groups
-            chosen[task], of_task[task] = self._settle(task, protocol, trials)
-        without = by_folds(of_task)
+            chosen[task] = self._settle(task, protocols.of(task), trials.folds)
+            without_trials[task] = protocols.by_trial(task).by_fold(task)
+        without = by_folds(without_trials)
         plans: dict[str, Plan] = {TRIAL: (trials.folds, without)}
         if groups is not None:
-            by_group = {task: groups.by_fold(task) for task in groups.table.right}
+            by_group = {task: groups.by_fold(task) for task in groups.sharing}
             plans[groups.name] = groups.folds, by_folds(by_group)
         together = decided_together(chosen, vectors, plans, self._jobs)
         return Settings(together, trials.folds, without, self.candidates, window_s, [])
@@ -244,13 +214,19 @@ class Choosing:
         window_s: float,
         chosen: Mapping[str, Chosen],
     ) -> Early | None:
-        """The settings of the decision points before the full window; None without
-        candidates for them."""
+        """The settings of the decision points before the full window; None where no
+        candidate has discriminants."""
         full = {task: settings.choice for task, settings in chosen.items()}
-        options = early_options(self._early_candidates, full)
+        picks = [
+            pick
+            for settings in chosen.values()
+            for candidate, pick in zip(self.candidates, settings.picks, strict=True)
+            if pick is not None and not candidate.known
+        ]
+        options = early_options(picks, full)
         if not options:
             return None
-        choices = [choice for option in (full, *options) for choice in option.values()]
+        choices = [choice for option in options for choice in option.values()]
         names = {name for choice in choices for name in choice.features}
         dataset = self._dataset.of(sorted(names)).with_kernels(window_s)
         at_points = [
@@ -261,19 +237,16 @@ class Choosing:
         vectors = Vectors(np.stack(at_points), self._y, dataset.names, widths)
         folds = self._divisions.folds
         heading = "early choices" * self._progress
-        return settle_early(
-            vectors, window_s, full, options, folds, self._jobs, heading
-        )
+        return settle_early(vectors, window_s, options, folds, self._jobs, heading)
 
-    def _settle(
-        self,
-        task: str,
-        protocol: TrialsLeftOut,
-        trials: TrialsLeftOut,
-    ) -> tuple[Chosen, list[Choice]]:
-        """A task's settings by a protocol; and [fold] those chosen without the trials
-        of a fold."""
-        without = protocol.without(task, trials.folds)
+    def _settle(self, task: str, protocol: Protocol, trial_folds: Integers) -> Chosen:
+        """A task's settings by a protocol.
+
+        Args:
+            task: to settle.
+            protocol: by whose answers.
+            trial_folds: (n,) of single trials.
+        """
         untouched = self._dataset.untouched_labels(task)
         groups = protocol.count(self._y[task])
         promise = partial(promised, untouched=untouched, groups=groups)
@@ -282,12 +255,12 @@ class Choosing:
         ]
         accuracy = promise(protocol.accuracy(task))
         by_trial = accuracy
-        if protocol is not trials:
+        if protocol.groups is not None:
             # `decided_together` counts the answers to left-out trials.
-            total = int((trials.folds >= 0)[self._y[task] != ""].sum())
+            total = int((trial_folds >= 0)[self._y[task] != ""].sum())
             none_right = Result(0, total, hits=np.zeros(total, dtype=bool))
             by_trial = promised(none_right, untouched)
-        chosen = Chosen(
+        return Chosen(
             choice=protocol.choice(task),
             accuracy=accuracy,
             by_trial=by_trial,
@@ -297,41 +270,28 @@ class Choosing:
             folds=protocol.folds,
             agreed=protocol.agreed(task),
         )
-        return chosen, without
 
 
-def _unseen(groups: Groups, grids: Sequence[SearchGrid]) -> list[SearchGrid]:
-    """The candidates for groups that are left out: with more shrinkage, but for
-    discriminants of these groups among others."""
-    unseen = []
-    for grid in grids:
-        least = UNSEEN_SHRINKAGE
-        most = np.inf
-        if groups.name in grid.targets:
-            least, most = TOGETHER_SHRINKAGES
-        enough = tuple(s for s in grid.shrinkages if least <= s <= most)
-        unseen.append(replace(grid, shrinkages=enough))
-    return unseen
+def _side_by_side(grids: Sequence[SearchGrid]) -> list[SearchGrid]:
+    """The grids of several tasks' discriminants side by side, a single space; all where
+    there are none."""
+    together = [grid for grid in grids if grid.targets]
+    return together or list(grids)
 
 
-def _grouped_tasks(groups: Groups, y: Labels) -> frozenset[str]:
+def _grouped_tasks(groups: Groups, y: Labels) -> tuple[str, ...]:
     """The tasks with groups, and those that agree with them."""
     together = [family for family in families(y) if groups.tasks & {*family}]
-    return groups.tasks.union(*together)
+    return tuple(sorted(groups.tasks.union(*together)))
 
 
 def for_tasks(
-    candidates: Sequence[Candidate], tasks: Collection[str], *, graded: bool = False
+    grid: SearchGrid, tasks: Sequence[str], *, graded: bool = False
 ) -> list[SearchGrid]:
-    """The grids that are for some of the tasks, as candidates for these alone, whose
-    answers are `graded` or not."""
-    limited = []
-    for candidate in candidates:
-        for grid in candidate.grids:
-            served = tuple(task for task in sorted(tasks) if grid.is_for(task))
-            if served:
-                limited.append(replace(grid, tasks=served, graded=graded))
-    return limited
+    """A grid as that of some tasks alone, whose answers are `graded` or not; none where
+    it is for none of them."""
+    served = tuple(task for task in tasks if grid.is_for(task))
+    return [replace(grid, tasks=served, graded=graded)] if served else []
 
 
 def decided_together(

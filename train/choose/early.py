@@ -11,14 +11,14 @@ with a discriminant of its own).
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import product
 
 import numpy as np
 
 from edge.arrays import Booleans, Floats, Integers
 from edge.model.info import StoppingRule
-from train.choose.candidates import Candidate
 from train.choose.evaluate import fold_numbers
 from train.data.folds import finest, stratified_folds
 from train.data.vectors import Vectors
@@ -34,7 +34,7 @@ MEANS = (1 / 3, 5 / 12, 1 / 2, 7 / 12, 2 / 3)
 """Mean times to decision, as parts of the full window, at which they are judged."""
 THRESHOLDS = 60
 FOLDS = 5
-SHRINKAGES = (0.3, 0.1, 0.03, 0.01)
+SHRINKAGES = (0.1, 0.03, 0.01)
 MOST_COMPONENTS = 100
 
 
@@ -54,7 +54,7 @@ class SureDecisions:
     def of(
         cls,
         answered: HeldOut,
-        parts: Sequence[str],
+        parts: Collection[str],
         seconds: Floats,
     ) -> SureDecisions:
         """The decisions by answers to left-out trials.
@@ -84,38 +84,29 @@ class SureDecisions:
         return float(np.interp(means_s, seconds, wrong).mean())
 
 
-def early_options(
-    candidates: Sequence[Candidate],
-    full: Choices,
-) -> list[dict[str, Choice]]:
-    """[option]{task: its settings} of candidates for early decision points:
-    discriminants, those of several tasks side by side where there are several.
+def early_options(picks: Sequence[Choice], full: Choices) -> list[dict[str, Choice]]:
+    """[option]{task: its settings} of candidates for early decision points: the
+    features, scalings and discriminants of the best settings at the full window of each
+    candidate that was not dropped there, with several shrinkages.
+
+    Early decisions measure no feature that the full window does not.
 
     Args:
-        candidates: for early decision points.
+        picks: these settings.
         full: {task: its settings at the full window}. The graph has one number of
             neighbours for all decision points.
     """
-    options = []
-    for candidate in candidates:
-        if candidate.projection != "lda":
-            continue
-        *_, grid = (grid for grid in candidate.grids if not grid.tasks)
-        for shrinkage in SHRINKAGES:
-            by_task = {
-                task: Choice(
-                    candidate.early,
-                    MOST_COMPONENTS,
-                    at_end.k,
-                    grid.projection,
-                    shrinkage,
-                    grid.features,
-                    grid.targets,
-                )
-                for task, at_end in full.items()
+    measured = {name for choice in full.values() for name in choice.features}
+    most = max((len(pick.targets) for pick in picks), default=0)
+    options = {}
+    for pick, shrinkage in product(picks, SHRINKAGES):
+        is_measured = measured.issuperset(pick.features)
+        if pick.projection == "lda" and len(pick.targets) == most and is_measured:
+            kind = replace(pick, k=1, components=MOST_COMPONENTS, shrinkage=shrinkage)
+            options[kind] = {
+                task: replace(kind, k=at_end.k) for task, at_end in full.items()
             }
-            options.append(by_task)
-    return options
+    return list(options.values())
 
 
 def points_of(window_s: float) -> Floats:
@@ -126,19 +117,18 @@ def points_of(window_s: float) -> Floats:
 def settle_early(
     vectors: Vectors,
     window_s: float,
-    full: Choices,
     options: Sequence[Choices],
     folds: Integers,
     jobs: int,
     heading: str = "",
 ) -> Early:
-    """The settings of the decision points before the full window: for each task, those
-    of the option that errs least often when sure.
+    """The settings of the decision points before the full window: those of the option
+    that errs least often when sure, as a mean over the tasks. All tasks share them, and
+    so a space, which leaves room for more decision points.
 
     Args:
         vectors: (points, n, p) at the `points_of` the window.
         window_s: the full window.
-        full: {task: its settings at the full window}.
         options: [option]{task: its settings}.
         folds: (n,) without which the settings are chosen too.
         jobs: processes.
@@ -146,23 +136,25 @@ def settle_early(
     """
     y = vectors.y
     left_out = stratified_folds(y[finest(y)], FOLDS)
-    runs = [[[*[option] * len(SHARES), full]] * FOLDS for option in options]
+    runs = [[[option] * len(vectors.X)] * FOLDS for option in options]
     answered = held_out(vectors, left_out, runs, jobs, heading)
     factors = factors_of(y)
-    best: dict[str, list[Choice]] = {}
-    for task, labels in y.items():
-        parts = tuple(factors.get(task, (task,)))
-        decided = [
-            SureDecisions.of(answers, parts, points_of(window_s))
+    decided = {
+        task: [
+            SureDecisions.of(answers, factors.get(task, (task,)), points_of(window_s))
             for answers in answered
         ]
-        means_s = np.array(MEANS) * window_s
-        best[task] = []
-        for fold in (-1, *fold_numbers(folds)):
+        for task in y
+    }
+    means_s = np.array(MEANS) * window_s
+    chosen_without = []
+    for fold in (-1, *fold_numbers(folds)):
+        errors = np.zeros(len(options))
+        for task, labels in y.items():
             tested = (labels != "") & (folds != fold)
-            errors = [decisions.error(means_s, tested) for decisions in decided]
-            best[task].append(options[int(np.argmin(errors))][task])
-    choices, *by_fold = by_folds(best)
+            errors += [of.error(means_s, tested) for of in decided[task]]
+        chosen_without.append(options[int(errors.argmin())])
+    choices, *by_fold = chosen_without
     return Early(choices, by_fold)
 
 

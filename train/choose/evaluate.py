@@ -104,7 +104,21 @@ class Promise(Result):
 
 WRONG = 0.5
 """Highest grade of a wrong answer."""
-RuleOf = Callable[[Sequence[Choice]], Rule]
+RuleOf = Callable[[str, Sequence[Choice]], Rule]
+"""Gives the rule that chooses among a task's candidates."""
+
+
+@dataclass(frozen=True)
+class Halving:
+    """How candidates are dropped after the first folds.
+
+    Attributes:
+        rules: of the choice.
+        sharing: the tasks that share their settings, for which all the same grids are.
+    """
+
+    rules: RuleOf
+    sharing: Sequence[str] = ()
 
 
 @dataclass(frozen=True)
@@ -156,27 +170,37 @@ class AnswerTable:
                     untested, True, right[:, folds == tested]
                 )
 
-    def drop(self, reach: int, rule_of: RuleOf) -> None:
+    def drop(self, reach: int, halving: Halving) -> None:
         """Drop from each choice the grids that are unlikely to be chosen, by the folds
         within `reach` of its own; see `Rule.dropped`.
 
         Args:
             reach: places in the circle of folds.
-            rule_of: gives the rule of the choice among some candidates.
+            halving: how they are dropped.
         """
         count = len(fold_numbers(self.folds))
-        for task, running in self.running.items():
-            rule = rule_of(self.choices[task])
-            grids = self.grids[task]
-            by_choice = [*self.right[task], self._alone(task)]
-            for choice, right in enumerate(by_choice):
+        apart = [(task,) for task in self.running if task not in halving.sharing]
+        for tasks in filter(None, [*apart, halving.sharing]):
+            rule = halving.rules(tasks[0], self.choices[tasks[0]])
+            running = self.running[tasks[0]]
+            numbers = [*fold_numbers(self.folds), None]
+            for choice, fold in enumerate(numbers):
                 near = np.isin(self.folds, folds_near(choice, reach, count))
-                near &= self.tested[task]
+                near &= np.all([self.tested[task] for task in tasks], axis=0)
                 places = np.flatnonzero(running[choice])
                 if near.any() and places.size:
                     among = replace(rule, allowed=places)
-                    dropped = among.dropped(right[:, near], grids)
-                    running[choice] &= ~np.isin(grids, dropped)
+                    answers = [self._by(task, fold)[:, near] for task in tasks]
+                    right = np.mean(answers, axis=0)
+                    dropped = among.dropped(right, self.grids[tasks[0]])
+                    running[choice] &= ~np.isin(self.grids[tasks[0]], dropped)
+            for task in tasks:
+                self.running[task][:] = running
+
+    def _by(self, task: str, fold: int | None) -> NDArray[Any]:
+        """(candidates, n) answers to each trial by the fits of this table without its
+        fold, and without another fold where that is named."""
+        return self._alone(task) if fold is None else self.right[task][fold]
 
     def _alone(self, task: str) -> NDArray[Any]:
         """(candidates, n) answers to each trial by the fits of this table without its
@@ -229,18 +253,6 @@ def chosen_by_fold(
     return [rule.choose(table.nested(task, fold)) for fold in fold_numbers(table.folds)]
 
 
-def chosen_by_other_fold(
-    table: AnswerTable, task: str, folds: Integers, rule: Rule
-) -> list[int]:
-    """[fold] the candidate chosen without the trials of one of other folds (n,).
-
-    The fits behind the answers may have seen these trials, which take no part in the
-    choice otherwise.
-    """
-    answers = table.plain(task)
-    return [rule.choose(answers[:, folds != fold]) for fold in fold_numbers(folds)]
-
-
 def nested_accuracy(
     table: AnswerTable, task: str, rule: Rule = MOST_ACCURATE
 ) -> Result:
@@ -266,7 +278,7 @@ def evaluate(
     jobs: int = 1,
     progress: Callable[[], object] = lambda: None,
     nested: bool = True,
-    halve: RuleOf | None = None,
+    halving: Halving | None = None,
 ) -> AnswerTable:
     """Fit every candidate without each fold, and without each two folds.
 
@@ -278,8 +290,7 @@ def evaluate(
         progress: called after each of the `fits`.
         nested: False makes the fits without each fold only, a fifth of the work. Of the
             table, `AnswerTable.plain` alone is then valid.
-        halve: gives the rule by which candidates are dropped after the first folds;
-            None drops none.
+        halving: how candidates are dropped after the first folds; None drops none.
 
     Raises:
         InputError: there are fewer than three folds, or the vectors are not finite.
@@ -292,7 +303,7 @@ def evaluate(
     vectors = replace(vectors, X=finite(vectors.X))
     classes = {task: _classes(labels) for task, labels in vectors.y.items()}
     table = _empty(folds, grids, classes)
-    steps = rungs(count, nested) if halve else [(count, fold_pairs(count, nested))]
+    steps = rungs(count, nested) if halving else [(count, fold_pairs(count, nested))]
     for step, (reach, pairs) in enumerate(steps, 1):
         work = [
             delayed(answers_without)(
@@ -303,8 +314,8 @@ def evaluate(
         for pair, answers in zip(pairs, in_processes(jobs, work), strict=True):
             progress()
             table.enter(pair, answers)
-        if halve is not None and step < len(steps):
-            table.drop(reach, halve)
+        if halving is not None and step < len(steps):
+            table.drop(reach, halving)
     return table
 
 
@@ -315,6 +326,7 @@ def _empty(
 ) -> AnswerTable:
     """A table of the tasks that some grid is for, in which every candidate runs."""
     count = len(fold_numbers(folds))
+    graded = any(grid.graded for grid in grids)
     choices = {}
     numbers = {}
     right = {}
@@ -329,7 +341,7 @@ def _empty(
             running[task] = np.ones((count + 1, sum(sizes)), dtype=bool)
             tested[task] = (labels >= 0) & (folds >= 0)
             untested = np.tile(~tested[task], (count, sum(sizes), 1))
-            right[task] = untested * 1.0 if grids[0].graded else untested
+            right[task] = untested * 1.0 if graded else untested
     return AnswerTable(folds, choices, right, tested, (), numbers, running)
 
 

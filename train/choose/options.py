@@ -10,7 +10,7 @@ from edge.errors import InputError
 from edge.touch.arm import Chain
 from edge.touch.features import SAMPLES
 from train.choose.candidates import CHOOSE_ALL, Fixed, candidates, features_of
-from train.choose.choose import Choosing
+from train.choose.choose import SECOND_WORTH, Choosing
 from train.data import pieces, thresholds
 from train.data.contacts import Untouched
 from train.data.dataset import DataSet, Measurement, Recordings, load_trials
@@ -24,6 +24,7 @@ class FitOptions(Fixed):
     """The settings that a fit holds fixed; it chooses the others."""
 
     window_s: float | None = None
+    second_worth: float = SECOND_WORTH
     samples: int = SAMPLES
     tasks: Sequence[str] | None = None
     leave_out: str = LEAVE_OUT

@@ -1,22 +1,22 @@
 """What is left out to choose a task's settings and to measure them: single trials, or
 entire groups of them."""
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from edge.arrays import Integers
+from edge.arrays import Floats, Integers
 from train.choose.candidates import Candidate, costs, places_of
 from train.choose.evaluate import (
     VARIANCE,
     AnswerTable,
     Promise,
     Result,
-    chosen_by_fold,
-    chosen_by_other_fold,
+    RuleOf,
     fold_numbers,
-    nested_accuracy,
 )
 from train.choose.rule import Rule
 from train.data.folds import SEED
@@ -26,18 +26,15 @@ from train.data.vectors import Strings
 from train.model.pipeline import Choice
 
 HALVINGS = 20
-UNSEEN_MARGIN = 0.01
-"""Accuracy on left-out groups within which the cheaper candidate is taken."""
 
 
 def rule_among(
     choices: Sequence[Choice],
     widths: Mapping[str, int],
     is_few: bool = False,
-    margin: float = 0.0,
 ) -> Rule:
-    """The rule that chooses among candidates: the cheapest of about the best, or the
-    best where trials are few.
+    """The rule that chooses among the candidates of a task without groups: the cheapest
+    of about the best, or the best where trials are few.
 
     Among few trials a standard error is wide, and the cheapest within it often less
     accurate: by 0 to 4 points on cuts of 54 trials of iCub, SDH-2 and simulated touches.
@@ -48,71 +45,98 @@ def rule_among(
         choices: of the candidates.
         widths: columns of each feature.
         is_few: whether trials are few.
-        margin: of a `Rule`.
     """
-    return Rule(None if is_few else costs(choices, widths), margin=margin)
+    return Rule(None if is_few else costs(choices, widths))
 
 
 @dataclass(frozen=True)
-class TrialsLeftOut:
-    """The choice by answers to single trials that are left out.
+class Protocol:
+    """The choice by answers to trials, or to entire groups of them, that are left out.
+
+    Tasks whose groups are left out share their settings: those with the best mean, over
+    these tasks, of the accuracies with trials and with groups left out. No price counts
+    there, as a few groups hold most errors: the standard error among trials says little.
 
     Attributes:
-        table: the answers.
-        widths: {feature: its columns}, by which a candidate has a price.
-        is_few: whether there are too few trials for prices; see `rule_among`.
+        table: the answers to what is left out.
+        rules: of the choice of a task.
+        groups: that are left out; None for single trials.
+        beside: the answers to what the other protocol leaves out; None of tasks without
+            groups.
+        sharing: the tasks that share their settings.
     """
 
     table: AnswerTable
-    widths: Mapping[str, int]
-    is_few: bool = False
+    rules: RuleOf
+    groups: Groups | None = None
+    beside: AnswerTable | None = None
+    sharing: Sequence[str] = ()
 
     @property
     def name(self) -> str:
         """What is left out."""
-        return TRIAL
+        return TRIAL if self.groups is None else self.groups.name
 
     @property
     def folds(self) -> Integers:
         """(n,) the fold of each trial."""
         return self.table.folds
 
-    def margin(self, task: str) -> float:
-        """Accuracy within which the cheaper candidate is taken."""
-        return 0.0
-
     def count(self, labels: Strings) -> int:
         """Number of groups among the trials with a label (n,); 0 for single trials."""
-        return 0
+        return 0 if self.groups is None else self.groups.count(labels)
 
     def rule(self, task: str) -> Rule:
         """The rule that chooses among the candidates."""
-        choices = self.table.choices[task]
-        return rule_among(choices, self.widths, self.is_few, self.margin(task))
+        return self.rules(task, self.table.choices[task])
+
+    def answers(self, task: str, shared: bool = True) -> Floats:
+        """(candidates, n) the answers to each trial that choose a task's settings.
+
+        Args:
+            task: to choose for.
+            shared: count the tasks that share its settings.
+        """
+        if self.beside is None:
+            return self.table.plain(task)
+        tasks = self.sharing if shared else [task]
+        tables = (self.table, self.beside)
+        return _mean(table.plain(task) for table in tables for task in tasks)
+
+    def answers_without(self, task: str, fold: int) -> NDArray[Any]:
+        """(candidates, others) those to the trials outside a fold, by fits without the
+        fold. The fits of the other protocol may have seen its trials, which take no
+        part in the choice otherwise."""
+        if self.beside is None:
+            return self.table.nested(task, fold)
+        outside = self.folds != fold
+        nested = [self.table.nested(task, fold) for task in self.sharing]
+        others = [self.beside.plain(task)[:, outside] for task in self.sharing]
+        return _mean([*nested, *others])
 
     def choice(self, task: str) -> Choice:
         """A task's settings."""
-        place = self.rule(task).choose(self.table.plain(task))
+        place = self.rule(task).choose(self.answers(task))
         return self.table.choices[task][place]
+
+    def places(self, task: str, rule: Rule) -> list[int]:
+        """[fold] the candidate chosen by a rule without what is left out."""
+        numbers = fold_numbers(self.folds)
+        return [rule.choose(self.answers_without(task, fold)) for fold in numbers]
 
     def by_fold(self, task: str) -> list[Choice]:
         """[fold] a task's settings chosen without what is left out."""
-        places = chosen_by_fold(self.table, task, self.rule(task))
+        places = self.places(task, self.rule(task))
         return [self.table.choices[task][place] for place in places]
-
-    def without(self, task: str, folds: Integers) -> list[Choice]:
-        """[fold] a task's settings chosen without the trials of one of the folds (n,)
-        of single trials."""
-        return self.by_fold(task)
 
     def accuracy(self, task: str) -> Result:
         """The nested accuracy of the choice."""
-        return nested_accuracy(self.table, task, self.rule(task))
+        return self.table.answered(task, self.places(task, self.rule(task)))
 
     def agreed(self, task: str) -> int:
         """In how many of `HALVINGS` divisions of the folds into two halves these choose
         the same features and projection."""
-        answers = self.table.plain(task)
+        answers = self.answers(task)
         rule = self.rule(task)
         numbers = fold_numbers(self.folds)
         draw = np.random.default_rng(SEED)
@@ -135,39 +159,42 @@ class TrialsLeftOut:
         allowed = places_of(candidate, choices)
         if not any(self.table.is_running(task, place) for place in allowed):
             return None
-        rule = replace(self.rule(task), allowed=allowed, margin=0.0)
-        place = rule.choose(self.table.plain(task))
-        return nested_accuracy(self.table, task, rule), choices[place]
+        rule = replace(self.rule(task), allowed=allowed)
+        place = rule.choose(self.answers(task))
+        result = self.table.answered(task, self.places(task, rule))
+        return result, choices[place]
 
 
 @dataclass(frozen=True)
-class GroupsLeftOut(TrialsLeftOut):
-    """The choice by answers to entire groups that are left out.
+class Protocols:
+    """The choices by what is left out.
 
     Attributes:
-        groups: of the trials.
+        trials: of tasks without groups, by single trials.
+        groups: of the tasks whose groups are left out; None where there are none.
+        shared: the choice of these tasks without folds of single trials.
     """
 
-    groups: Groups = field(kw_only=True)
+    trials: Protocol
+    groups: Protocol | None = None
+    shared: Protocol | None = None
 
-    @property
-    def name(self) -> str:
-        """What is left out."""
-        return self.groups.name
+    def of(self, task: str) -> Protocol:
+        """The protocol that settles a task."""
+        if self.groups is not None and task in self.groups.sharing:
+            return self.groups
+        return self.trials
 
-    def margin(self, task: str) -> float:
-        """Accuracy within which the cheaper candidate is taken."""
-        return UNSEEN_MARGIN if task in self.groups.tasks else 0.0
+    def by_trial(self, task: str) -> Protocol:
+        """The same choice, with folds of single trials."""
+        if self.shared is not None and task in self.shared.sharing:
+            return self.shared
+        return self.trials
 
-    def count(self, labels: Strings) -> int:
-        """Number of groups among the trials with a label (n,)."""
-        return self.groups.count(labels)
 
-    def without(self, task: str, folds: Integers) -> list[Choice]:
-        """[fold] a task's settings chosen without the trials of one of the folds (n,)
-        of single trials, by answers to left-out groups too."""
-        places = chosen_by_other_fold(self.table, task, folds, self.rule(task))
-        return [self.table.choices[task][place] for place in places]
+def _mean(answers: Iterable[NDArray[Any]]) -> Floats:
+    """The mean of arrays of one shape."""
+    return np.asarray(np.mean(list(answers), axis=0))
 
 
 def promised(result: Result, untouched: Sequence[str] = (), groups: int = 0) -> Promise:

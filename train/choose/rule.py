@@ -24,13 +24,10 @@ class Rule:
         prices: (candidates,) of each. At equal price the most accurate counts, then the
             first. Without prices the most accurate of all is taken.
         allowed: the candidates to choose from; all where None.
-        margin: loss of accuracy that is accepted for a lower price, whatever the
-            standard error.
     """
 
     prices: Integers | None = None
     allowed: Integers | None = None
-    margin: float = 0.0
 
     def choose(self, right: Booleans | Floats) -> int:
         """The candidate chosen by answers (candidates, n): whether they are right, or
@@ -46,7 +43,7 @@ class Rule:
         answers = right[candidates[best]].astype(np.float64)
         worse = answers[means[best].argmax()] - answers
         error = worse.std(axis=1) / np.sqrt(right.shape[1])
-        within = worse.mean(axis=1) <= np.maximum(error, self.margin)
+        within = worse.mean(axis=1) <= error
         return int(candidates[best[within.argmax()]])
 
     def dropped(self, right: Booleans, grids: Integers) -> list[int]:

@@ -27,7 +27,7 @@ class Chosen:
             task alone; None where it was dropped, or is none for the task.
         picks: the best settings of each candidate, likewise.
         folds: (n,) of `accuracy`.
-        agreed: see `TrialsLeftOut.agreed`.
+        agreed: see `Protocol.agreed`.
         by_fold: [fold]{task: the choice without the fold's trials}, whose decisions
             `accuracy` counts: those of the task and of the tasks that are decided
             together with it.

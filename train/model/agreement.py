@@ -4,6 +4,8 @@ from itertools import combinations
 
 import numpy as np
 
+from train.data.folds import finest
+from train.data.groups import LEAVE_OUT
 from train.data.vectors import Labels, Strings
 
 
@@ -11,20 +13,37 @@ def products(y: Labels) -> dict[str, tuple[str, str]]:
     """{task: two other tasks whose labels together determine its own, and follow from
     it}.
 
-    Neither of the two determines the task alone.
+    Neither of the two determines the task alone, and neither names things: `object`, or
+    the task with most labels. Of several pairs the one is taken whose labels the task's
+    words are made of, as `rigid-fixed` is, or else the one with the fewest labels.
     """
     pairs: dict[str, tuple[str, str]] = {}
+    names_things = {LEAVE_OUT, finest(y)}
     for task, labels in y.items():
         factors = []
-        for factor in y:
+        for factor in sorted(y.keys() - {task} - names_things):
             follows = _determines(labels, y[factor])
-            if factor != task and follows and not _determines(y[factor], labels):
+            if follows and not _determines(y[factor], labels):
                 factors.append(factor)
+        possible = []
         for a, b in combinations(factors, 2):
             joined = np.char.add(np.char.add(y[a], "\0"), y[b])
-            if task not in pairs and _determines(joined, labels):
-                pairs[task] = (a, b)
+            if _determines(joined, labels):
+                count = len({*y[a].tolist()}) + len({*y[b].tolist()})
+                possible.append((not _are_words(y[a], y[b], labels), count, (a, b)))
+        if possible:
+            *_, pairs[task] = min(possible)
     return pairs
+
+
+def _are_words(a: Strings, b: Strings, labels: Strings) -> bool:
+    """Whether each label is made of those of two tasks, as the words of `rigid-fixed`
+    are."""
+    labelled = (a != "") & (b != "") & (labels != "")
+    rows = zip(a[labelled], b[labelled], labels[labelled], strict=True)
+    return all(
+        name in (f"{one}-{other}", f"{other}-{one}") for one, other, name in rows
+    )
 
 
 def _determines(a: Strings, b: Strings) -> bool:

@@ -14,8 +14,8 @@ a fold's trials come from a logistic regression on the other folds.
 
 Tasks that agree (`edge.model.agreement`) have one rule: the factors are decided when
 each is sure, their product when both are, and the tests count the product's errors.
-Below the smallest error that is certified for the product, each factor has rules of its
-own (`agreeing`).
+Below the smallest error that is certified for the product, its factors wait for the
+full window with it (`agreeing`).
 
 The tests are exact for the average of the folds' models. The exported model is fitted
 on all trials, a tenth (or a fifth) more, with its own choice of settings. On average it
@@ -40,6 +40,8 @@ RISK = 0.1
 """Probability that a certificate is wrong."""
 THRESHOLDS = np.round(expit(np.arange(8.0, -1.05, -0.1)), 4)
 """Confidences at which rules stop, evenly spaced in the logarithm of their odds."""
+FULL_LEVEL = TEST_SHARE * RISK
+"""Level of the test of the full window."""
 NEVER = 2.0
 """A confidence that is never reached."""
 
@@ -108,6 +110,23 @@ def candidates(points: int) -> tuple[StoppingRule, list[list[StoppingRule]]]:
     return full, [sure, fixed]
 
 
+def tested(
+    rule: StoppingRule, course: Course, seconds: Floats, level: float, before: float
+) -> StoppingRule:
+    """A rule with the error that is certified for it, at least `before`, and its mean
+    time."""
+    at, wrong = course.under(rule)
+    limit = upper_limit(int(wrong.sum()), course.unusual.shape[1], level)
+    mean_s = float(seconds[at].mean())
+    return StoppingRule(max(limit, before), mean_s, rule.confidence, rule.last)
+
+
+def at_full_window(course: Course, seconds: Floats) -> StoppingRule:
+    """The rule that always waits for the full window, tested first of all."""
+    full, _ = candidates(len(seconds))
+    return tested(full, course, seconds, FULL_LEVEL, 0.0)
+
+
 def certify(course: Course, seconds: Floats) -> list[StoppingRule]:
     """The rules that no other rule beats in both certified error and mean time, the
     safest first.
@@ -116,21 +135,13 @@ def certify(course: Course, seconds: Floats) -> list[StoppingRule]:
         course: of the task, on the calibration trials.
         seconds: (points,) windows.
     """
-    n = course.unusual.shape[1]
-    full_level = TEST_SHARE * RISK
-
-    def tested(rule: StoppingRule, level: float, before: float) -> StoppingRule:
-        at, wrong = course.under(rule)
-        limit = upper_limit(int(wrong.sum()), n, level)
-        mean = float(seconds[at].mean())
-        return StoppingRule(max(limit, before), mean, rule.confidence, rule.last)
-
-    full, families = candidates(len(seconds))
-    passed = [tested(full, full_level, 0.0)]
+    _, families = candidates(len(seconds))
+    passed = [at_full_window(course, seconds)]
     for family in families:
         before = passed[0].error
         for rule in family:
-            passed.append(tested(rule, full_level / len(families), before))
+            level = FULL_LEVEL / len(families)
+            passed.append(tested(rule, course, seconds, level, before))
             before = passed[-1].error
     # Among equal rules the fixed window comes first, as it needs no confidence.
     passed.sort(key=lambda rule: (rule.error, rule.mean_s, not is_fixed(rule)))
@@ -152,10 +163,9 @@ def agreeing(
     rules at a pace of their own.
 
     A factor is wrong only where its product is, so it may follow the product's rules.
-    Before them it has its own that err less often. No rule is slower for a factor than
-    those before it. The product, which takes its factors' labels, has the rules that
-    both follow. Where there are none, nothing is certified for it: the pair of the
-    factors' fastest rules was chosen by the trials that would have to test it.
+    Before them it waits for the full window: a product that is not certified must not
+    be made of early factors. No rule is slower for a factor than those before it. The
+    product, which takes its factors' labels, has the rules that both follow.
 
     Args:
         product: a task.
@@ -167,19 +177,16 @@ def agreeing(
     least = rules[product][0].error
     agreed = {}
     for factor in factors:
-        agreed[factor] = [rule for rule in rules[factor] if rule.error < least]
+        waiting = at_full_window(courses[factor], seconds)
+        agreed[factor] = [waiting] if waiting.error < least else []
     of_product: list[StoppingRule] = []
     for rule in rules[product]:
         followed = _followed(rule, agreed, courses, seconds)
+        # A factor that goes on by itself would make the product err more often.
         if len(followed) == len(factors):
             of_product.append(rule)
-        elif of_product:
-            # Factors that go on by themselves would make the product err more often.
-            continue
-        for factor, of_factor in followed.items():
-            agreed[factor].append(of_factor)
-    if not of_product:
-        of_product = [replace(rules[product][0], error=1.0)]
+            for factor, of_factor in followed.items():
+                agreed[factor].append(of_factor)
     return {product: of_product, **agreed}
 
 

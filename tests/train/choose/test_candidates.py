@@ -5,7 +5,6 @@ import pytest
 
 from tests.train.model.test_agreement import TASKS
 from train.choose.candidates import (
-    EARLY_WITH_JOINTS,
     PLAIN,
     WITH_JOINTS,
     WITH_SHEAR,
@@ -15,9 +14,10 @@ from train.choose.candidates import (
 )
 from train.data.feature_sets import expand
 from train.model.pipeline import Choice
+from train.model.scaling import BY_COLUMN
 
 
-def test_the_discriminants_of_all_tasks_side_by_side_are_tried_but_not_for_drawn_things():
+def test_all_tasks_side_by_side_are_tried_but_not_for_drawn_things():
     """Category is left out, as its factors are there."""
     together = ("mobility", "object", "softness")
     y = {task: np.tile(labels, 2) for task, labels in TASKS.items()}
@@ -30,34 +30,31 @@ def test_the_discriminants_of_all_tasks_side_by_side_are_tried_but_not_for_drawn
         }
         for d in (False, True)
     )
-    assert plain == {(), ("mobility", "softness"), together}
-    assert together not in drawn
+    assert plain == {(), together}
+    assert drawn == {()}
 
 
-def test_factors_that_a_trial_of_the_product_lacks_are_not_set_side_by_side():
-    """A thing whose category is of its own, such as `liquid`, has no softness and no
-    mobility."""
-    y = {
-        task: np.append(labels, "")
-        for task, labels in TASKS.items()
-        if task != "object"
+def test_columns_are_scaled_too_where_motions_of_joints_stand_beside_other_features():
+    y = {**TASKS, "object": np.array(["a", "b", "c", "d"])}
+    scalings = {
+        (grid.scaling, "joints" in candidate.name, bool(grid.targets))
+        for candidate in candidates(y, joints=True)
+        if not candidate.known
+        for grid in candidate.grids
     }
-    y["category"][-1] = "liquid"
-    targets = {grid.targets for candidate in candidates(y) for grid in candidate.grids}
-    assert ("mobility", "softness") not in targets
+    assert (BY_COLUMN, True, True) in scalings
+    assert not {(BY_COLUMN, True, False), (BY_COLUMN, False, True)} & scalings
 
 
 def sets_of(known=False, **words):
     """The feature sets that are candidates, for known things alone or for all."""
     every = candidates(TASKS, **words)
-    return {c.sets for c in every if c.full and c.known == known}
+    return {c.sets for c in every if c.known == known}
 
 
 def test_features_of_joints_are_candidates_where_recordings_have_them():
     assert sets_of() == set(PLAIN)
     assert sets_of(joints=True) == set(WITH_JOINTS)
-    with_joints = candidates(TASKS, joints=True)
-    assert {c.sets for c in with_joints if c.early} == set(EARLY_WITH_JOINTS)
     assert len(candidates(TASKS, joints=True, quick=True)) == 3
 
 

@@ -12,12 +12,8 @@ from edge.saving import save
 from edge.statistics import wilson
 from train.choose.choose import Choosing, decided_together
 from train.choose.evaluate import AnswerTable, Promise
-from train.choose.protocols import (
-    HALVINGS,
-    GroupsLeftOut,
-    TrialsLeftOut,
-    rule_among,
-)
+from train.choose.protocols import HALVINGS, Protocol, rule_among
+from train.choose.rule import Rule
 from train.choose.settings import Chosen
 from train.data.groups import Divisions, Groups
 from train.data.parts import part
@@ -27,33 +23,40 @@ from train.model.pipeline import Choice, ContactClassifier, vote
 TWO = ("max_force", "contact_area")
 
 
-@pytest.mark.parametrize(
-    ("grouped", "k", "by_trial"), [(False, 1, 1.0), (True, 3, 0.0)]
-)
-def test_settings_are_chosen_by_left_out_trials_or_groups_also_without_a_fold(
-    grouped, k, by_trial
-):
-    """Of two candidates: one right on other trials of known objects, the other on new
-    objects."""
-    choices = {"t": [Choice("IV", 1, 1, "lda"), Choice("IV", 1, 3, "lda")]}
+def two_tasks(choices):
+    """The answers of two candidates to twelve trials, of which the first is right about
+    `t` and `u` by single trials; and with groups left out, where the second has eight
+    more right about `t`, and the first two about `u`."""
     folds = np.arange(12) % 3
-    right = np.repeat([[True], [False]], 12, axis=1)
-    trials = AnswerTable(folds, choices, {"t": np.stack([right] * 3)})
-    unseen = AnswerTable(folds // 2, choices, {"t": np.stack([~right] * 2)})
-    objects = Groups("object", folds.astype(str), frozenset({"t"}), unseen.folds)
-    dataset = SimpleNamespace(
-        names=("max_force",),
-        widths=lambda samples: (1,),
-        untouched_labels=lambda t: (),
+    always = np.repeat([[True], [False]], 12, axis=1)
+    t = np.stack([np.arange(12) < 0, np.arange(12) < 12])
+    u = np.stack([np.arange(12) < 8, np.arange(12) < 6])
+    trials = {task: np.stack([always] * 3) for task in "tu"}
+    groups = {"t": np.stack([t] * 2), "u": np.stack([u] * 2)}
+    by_task = dict.fromkeys("tu", choices)
+    return (
+        AnswerTable(folds, by_task, trials),
+        AnswerTable(folds // 2, by_task, groups),
     )
-    divisions = Divisions(folds, (), objects if grouped else None)
-    choosing = Choosing(dataset, {"t": folds.astype(str)}, (), divisions, samples=1)
-    single = TrialsLeftOut(trials, {"max_force": 1})
-    whole = GroupsLeftOut(unseen, {"max_force": 1}, groups=objects)
-    chosen, without = choosing._settle("t", whole if grouped else single, single)
-    assert [choice.k for choice in (chosen.choice, *without)] == [k] * 4
-    assert chosen.accuracy.accuracy == 1.0
-    assert chosen.by_trial.accuracy == by_trial
+
+
+def test_tasks_with_groups_share_the_best_mean_of_both_protocols():
+    """By trials the first candidate gains 12 of 12 in both tasks, with groups left out it
+    loses 12 of one and gains 2 of the other."""
+    choices = [Choice("IV", 1, k, "lda") for k in (1, 3)]
+    trials, unseen = two_tasks(choices)
+    objects = Groups("object", trials.folds.astype(str), frozenset("tu"), unseen.folds)
+    always = lambda task, choices: Rule()  # noqa: E731
+    by_trials = Protocol(trials, always, beside=unseen, sharing="tu")
+    by_groups = Protocol(unseen, always, objects, trials, "tu")
+    for protocol, folds in ((by_trials, 3), (by_groups, 2)):
+        assert [protocol.choice(task).k for task in "tu"] == [1, 1]
+        assert [choice.k for choice in protocol.by_fold("t")] == [1] * folds
+    assert by_groups.name == "object"
+    assert by_groups.accuracy("t").accuracy == 0.0
+    assert by_groups.accuracy("u").accuracy == 8 / 12
+    alone = replace(by_groups, sharing="t")
+    assert alone.answers("t").mean(axis=1).tolist() == [0.5, 0.5]
 
 
 def test_halves_of_the_folds_agree_where_one_candidate_is_right_in_all_of_them():
@@ -64,7 +67,7 @@ def test_halves_of_the_folds_agree_where_one_candidate_is_right_in_all_of_them()
 
     def agreed(right):
         table = AnswerTable(folds, {"t": choices}, {"t": np.stack([right] * 4)})
-        return TrialsLeftOut(table, dict.fromkeys(TWO, 1), is_few=True).agreed("t")
+        return Protocol(table, lambda task, choices: Rule()).agreed("t")
 
     assert agreed(best) == HALVINGS
     # They differ where a half has both folds in which one of the two is right.
@@ -178,7 +181,7 @@ def late(make_touch, tmp_path_factory):
     )
 
 
-def test_the_window_is_the_shortest_that_tells_what_longer_ones_do(late):
+def test_no_second_is_waited_that_tells_nothing(late):
     assert late.window_s == 2.4
     (note,) = [note for note in late.notes if "the window is" in note]
     assert "the window is 2.4 s" in note
@@ -209,7 +212,7 @@ def window_of(monkeypatch):
     which they have some wrong."""
     wrong = {1.2: range(8), 2.4: (0, 1), 4.8: (2,)}
 
-    def chosen(onset_s):
+    def chosen(onset_s, worth):
         recording = SimpleNamespace(t=np.arange(3.0))
         trials = [SimpleNamespace(onset_s=onset_s, recording=recording)] * 40
         dataset = SimpleNamespace(trials=trials, names=(), widths=lambda samples: ())
@@ -218,22 +221,26 @@ def window_of(monkeypatch):
         choosing = Choosing(dataset, {"t": folds.astype(str)}, (), divisions, samples=1)
         answers = {w: {"t": 1.0 - np.isin(np.arange(40), wrong[w])} for w in wrong}
         monkeypatch.setattr(choosing, "_right", answers.get)
-        return choosing.window(tuple(wrong))
+        return choosing.window(tuple(wrong), worth)
 
     return chosen
 
 
+@pytest.mark.parametrize(
+    ("worth", "seconds"), [(0.0, 4.8), (0.005, 4.8), (0.02, 2.4), (0.2, 1.2)]
+)
+def test_a_window_is_worth_its_accuracy_less_its_wait(window_of, worth, seconds):
+    """Of forty trials 8, 2 and 1 are wrong after 1.2, 2.4 and 4.8 s."""
+    window_s, _ = window_of(onset_s=0.5, worth=worth)
+    assert window_s == seconds
+
+
 def test_what_a_longer_window_gains_is_said_with_its_option(window_of):
-    window_s, (note, gain) = window_of(onset_s=0.5)
-    assert window_s == 2.4
-    assert note.startswith("the window is 2.4 s, as the touches last longer than 1.2 s")
+    _, (note, gain) = window_of(onset_s=0.5, worth=0.02)
+    assert note.startswith(
+        "the window is 2.4 s: a second of waiting counts as 2 points"
+    )
     assert gain == "--window 4.8: t 98% instead of 95% in cross-validation"
-
-
-def test_the_most_accurate_window_is_taken_where_most_touches_are_late(window_of):
-    window_s, (note,) = window_of(onset_s=0.0)
-    assert window_s == 4.8
-    assert "as most touches begin before their recording" in note
 
 
 @pytest.mark.parametrize(

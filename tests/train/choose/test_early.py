@@ -1,6 +1,7 @@
 """Settings before the full window: which trials are decided when sure, and how the
 errors of these choose."""
 
+from dataclasses import replace
 from itertools import product
 from types import SimpleNamespace
 
@@ -8,11 +9,16 @@ import numpy as np
 import pytest
 
 from edge.saving import save
-from train.choose.candidates import candidates, features_of
+from train.choose.candidates import Fixed, candidates, features_of
 from train.choose.choose import Choosing
-from train.choose.early import SHARES, SureDecisions, early_options, settle_early
+from train.choose.early import (
+    SHARES,
+    SHRINKAGES,
+    SureDecisions,
+    early_options,
+    settle_early,
+)
 from train.data.dataset import Measurement, load_trials
-from train.data.feature_sets import expand
 from train.data.groups import Divisions
 from train.data.vectors import Vectors
 from train.model.held_out import HeldOut
@@ -56,44 +62,40 @@ class TestSureDecisions:
         assert decided.error(np.array([0.6]), np.array([True, False])) == 0.0
 
 
-def early_settings(make_touch, folder, arm):
-    """The settings before the full window, where those of the full window take 3
-    neighbours."""
-    for kind, seed in product(("hard", "soft"), range(5)):
-        touch = make_touch(kind=kind, seed=seed, arm=arm, labels={"softness": kind})
-        save(folder / f"{kind}-{seed}.npz", touch)
-    early = [c for c in candidates({}, joints=arm) if c.early or not arm]
-    early = early[:2]
-    dataset = load_trials([folder], Measurement(features_of(early)))
-    y = {"softness": dataset.labels("softness")}
-    choosing = Choosing(dataset, y, early, Divisions.of(dataset, y), samples=10)
-    full = Choice("IV", 1, 3, features=early[0].grids[0].features)
-    return choosing.early(1.2, {"softness": SimpleNamespace(choice=full)})
-
-
-def test_decision_points_before_the_full_window_have_settings_where_joints_are_known(
+def test_decision_points_before_the_full_window_have_settings_of_their_own(
     make_touch, tmp_path
 ):
-    early = early_settings(make_touch, tmp_path, arm=True)
-    assert early.choices["softness"].projection == "lda"
+    for kind, seed in product(("hard", "soft"), range(5)):
+        touch = make_touch(kind=kind, seed=seed, labels={"softness": kind})
+        save(tmp_path / f"{kind}-{seed}.npz", touch)
+    (contact,) = candidates({}, Fixed(["contact"], "lda"))
+    dataset = load_trials([tmp_path], Measurement(features_of([contact])))
+    y = {"softness": dataset.labels("softness")}
+    choosing = Choosing(dataset, y, [contact], Divisions.of(dataset, y), samples=10)
+    pick = Choice("IV", 1, 3, "lda", 1.0, contact.grids[0].features)
+    early = choosing.early(
+        1.2, {"softness": SimpleNamespace(choice=pick, picks=[pick])}
+    )
+    assert early.choices["softness"].shrinkage in SHRINKAGES
     assert len(early.by_fold) == 10
 
 
-def test_without_joints_they_have_the_settings_of_the_full_window(make_touch, tmp_path):
-    assert early_settings(make_touch, tmp_path, arm=False) is None
-
-
-def test_the_discriminants_of_all_tasks_serve_each_where_there_are_several():
-    labels = np.array(["a", "b"] * 10)
-    full = {task: Choice("none", 2, k) for task, k in (("t", 1), ("u", 5))}
-    tried = candidates(dict.fromkeys(full, labels), joints=True)
-    options = early_options([c for c in tried if c.early], full)
-    assert {option["t"].targets for option in options} == {("t", "u")}
-    assert {(option["t"].k, option["u"].k) for option in options} == {(1, 5)}
-    assert {option["t"].features for option in options} == {
-        expand(["contact", "sqrt_joints"]),
-        expand(["sqrt_joints"]),
-    }
+def test_options_are_the_surviving_discriminants_of_features_that_are_measured_anyway():
+    together = Choice("IV", 9, 1, "lda", 1e-3, ("max_force",), ("t", "u"))
+    full = {"t": replace(together, k=5), "u": together}
+    picks = [
+        together,
+        replace(together, scaling="columns"),
+        replace(together, targets=()),
+        replace(together, features=("contact_area",)),
+        replace(together, projection="pca"),
+    ]
+    options = early_options(picks, full)
+    assert {option["t"].scaling for option in options} == {"IV", "columns"}
+    assert {option["t"].shrinkage for option in options} == set(SHRINKAGES)
+    assert {(option["t"].k, option["u"].k) for option in options} == {(5, 1)}
+    assert {option["t"].features for option in options} == {("max_force",)}
+    assert len(options) == 2 * len(SHRINKAGES)
 
 
 @pytest.fixture
@@ -113,7 +115,7 @@ def settled():
         vectors = Vectors(X, {"t": labels}, ("max_force", "contact_area"), (1, 1))
         first = {"t": Choice("none", 1, 1, "lda", features=("max_force",))}
         second = {"t": Choice("none", 1, 1, "lda", features=("contact_area",))}
-        early = settle_early(vectors, 1.2, first, [first, second], folds, 1)
+        early = settle_early(vectors, 1.2, [first, second], folds, 1)
         by_fold = [choices["t"].features[0] for choices in early.by_fold]
         return early.choices["t"].features[0], by_fold
 

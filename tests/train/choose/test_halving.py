@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from train.choose.evaluate import evaluate
+from train.choose.evaluate import Halving, evaluate
 from train.choose.halving import fold_pairs, folds_near, rungs
 from train.choose.rule import Rule
 from train.choose.search import SearchGrid
@@ -18,7 +18,7 @@ GRIDS = [
 ]
 
 
-def by_price(choices):
+def by_price(task, choices):
     """The rule of candidates of which the first are the cheapest."""
     return Rule(np.arange(len(choices)))
 
@@ -50,7 +50,7 @@ def vectors():
 
 
 def test_a_grid_that_is_dropped_is_fitted_no_further(vectors):
-    table = evaluate(vectors, FOLDS, GRIDS, halve=by_price)
+    table = evaluate(vectors, FOLDS, GRIDS, halving=Halving(by_price))
     running = table.running["t"]
     assert running[:, :2].all()
     assert not running[:, 4:].any()
@@ -65,7 +65,18 @@ def test_what_is_dropped_without_a_fold_does_not_depend_on_its_labels(vectors):
     labels[FOLDS == 3] = np.where(labels[FOLDS == 3] == "a", "b", "a")
     changed = replace(vectors, y={"t": labels})
     running, other = (
-        evaluate(v, FOLDS, GRIDS, halve=by_price).running["t"]
+        evaluate(v, FOLDS, GRIDS, halving=Halving(by_price)).running["t"]
         for v in (vectors, changed)
     )
     assert (running[3] == other[3]).all()
+
+
+def test_tasks_that_share_their_settings_drop_what_is_behind_in_their_mean(vectors):
+    """The second task's labels follow from no feature."""
+    chance = np.array(["x", "y"])[np.arange(220) % 2]
+    both = replace(vectors, y={"t": vectors.y["t"], "u": chance})
+    halving = Halving(lambda task, choices: Rule(), sharing=("t", "u"))
+    table = evaluate(both, FOLDS, GRIDS, halving=halving)
+    assert (table.running["t"] == table.running["u"]).all()
+    assert table.running["t"][:, :2].all()
+    assert not table.running["t"][:, 4:].all()

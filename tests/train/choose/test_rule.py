@@ -14,7 +14,6 @@ def test_the_cheapest_within_a_standard_error_of_the_difference_is_chosen():
     assert Rule().choose(right) == 2
     assert Rule(rising).choose(right) == 1
     assert Rule(np.array([0, 2, 1])).choose(right) == 2
-    assert Rule(rising, margin=0.2).choose(right) == 0
     assert Rule(rising, allowed=np.array([0, 2])).choose(right) == 2
 
 

@@ -29,6 +29,29 @@ def test_each_label_of_a_product_stands_for_a_pair_and_no_task_is_in_two():
     assert families(TASKS) == [("category", "mobility", "softness")]
 
 
+def test_a_pair_is_chosen_by_the_products_words_and_never_names_things():
+    """Each category holds a single object, as in nearly every first set."""
+    first = {
+        "category": np.array(["rigid-fixed", "rigid-movable", "soft-movable"]),
+        "mobility": np.array(["fixed", "movable", "movable"]),
+        "object": np.array(["box", "box", "pillow"]),
+        "softness": np.array(["rigid", "rigid", "soft"]),
+    }
+    assert products(first)["category"] == ("mobility", "softness")
+    del first["softness"]
+    assert "category" not in products(first)
+
+
+def test_without_such_words_the_pair_with_the_fewest_labels_is_taken():
+    shades = {
+        "kind": np.array(["a", "b", "c", "d", "e"]),
+        "form": np.array(["x", "x", "y", "y", "y"]),
+        "hue": np.array(["1", "2", "1", "2", "3"]),
+        "tone": np.array(["1", "2", "1", "3", "4"]),
+    }
+    assert products(shades)["kind"] == ("form", "hue")
+
+
 def test_a_pair_that_was_never_met_is_no_label():
     """Nor is there a product where a factor's label is in no pair."""
     three = {task: labels[:3] for task, labels in TASKS.items()}

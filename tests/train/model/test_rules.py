@@ -130,50 +130,34 @@ class TestProduct:
         assert at.tolist() == [0, 0]
         assert wrong.all()
 
-    def agreeing(self, strict, *rules):
-        """The rules of the product and of its fast factor, that has one of its own."""
-        factors = {"fast": [strict, StoppingRule(0.25, 0.3, 0.6, 2)], "slow": []}
+    def agreeing(self, *rules):
+        """The rules of the product and of its fast factor."""
         courses = {
-            "fast": course(self.FAST, self.WRONG),
+            "fast": course(self.FAST, np.zeros_like(self.WRONG)),
             "slow": course(self.SLOW, self.WRONG),
             "product": self.product(),
         }
-        by_task = agreeing(
-            "product", factors, {"product": rules, **factors}, courses, SECONDS
-        )
+        factors = ("fast", "slow")
+        by_task = agreeing("product", factors, {"product": rules}, courses, SECONDS)
         return by_task["product"], by_task["fast"]
 
-    def test_a_factor_follows_its_rules_at_its_own_pace_after_stricter_ones_of_its_own(
-        self,
-    ):
-        sure = StoppingRule(0.3, 1.0, 0.7, 2)
-        strict = StoppingRule(0.1, 1.2, NEVER, 2)
-        window = StoppingRule(0.2, 1.2, NEVER, 2)
-        product, factor = self.agreeing(strict, window, sure)
+    LIMIT = upper_limit(0, 2, TEST_SHARE * RISK)
+    WAITING = StoppingRule(LIMIT, 1.2, NEVER, 2)
+
+    def test_a_factor_follows_its_rules_at_its_own_pace_and_waits_before_them(self):
+        window = StoppingRule(0.8, 1.2, NEVER, 2)
+        sure = StoppingRule(0.9, 1.0, 0.7, 2)
+        product, factor = self.agreeing(window, sure)
         assert product == [window, sure]
-        assert factor == [strict, window, replace(sure, mean_s=0.4)]
+        assert factor == [self.WAITING, window, replace(sure, mean_s=0.4)]
 
     def test_a_factor_is_never_slower_at_a_looser_error(self):
         """The product has the rules that both follow."""
-        strict = StoppingRule(0.1, 0.4, 0.8, 2)
-        window = StoppingRule(0.2, 1.2, NEVER, 2)
-        slow = StoppingRule(0.3, 1.2, 0.95, 2)
-        fast = StoppingRule(0.4, 1.0, 0.7, 2)
-        product, factor = self.agreeing(strict, window, slow, fast)
+        fast = StoppingRule(0.8, 1.0, 0.7, 2)
+        slow = StoppingRule(0.9, 1.2, 0.95, 2)
+        product, factor = self.agreeing(fast, slow)
         assert product == [fast]
-        assert factor == [strict, replace(fast, mean_s=0.4)]
-
-    def test_a_product_that_no_factor_follows_promises_nothing(self):
-        """None of the two trials is wrong by the factors' fastest rules, which the
-        same trials chose."""
-        strict = StoppingRule(0.1, 0.4, 0.8, 2)
-        slow = StoppingRule(0.2, 1.2, 0.95, 2)
-        product, factor = self.agreeing(strict, slow)
-        assert factor == [strict]
-        assert product == [replace(slow, error=1.0)]
-        window = StoppingRule(strict.error, 1.2, NEVER, 2)
-        _, factor = self.agreeing(strict, window)
-        assert factor == [window]
+        assert factor == [self.WAITING, replace(fast, mean_s=0.4)]
 
 
 def test_a_family_has_half_the_level_and_goes_on_from_its_last_limit():
