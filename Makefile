@@ -10,7 +10,7 @@ PIP := $(BIN)/$(PINNED) constraints.txt
 export OPENBLAS_NUM_THREADS := 1
 
 .PHONY: help venv test test-all test-busy lint types export demo demo-data golden study tradeoff wheel wheel-test \
-  board-test browser-test c-test kernel-test peers-test service-test hard-cases hard-cases-versions mutants fuzz kills accuracy bench transfer remount docs faults risk shifts \
+  board-test browser-test c-test kernel-test peers-test service-test hard-cases hard-cases-versions mutants fuzz kills accuracy bench transfer remount docs faults flags risk shifts \
   stopping soak measured constraints clean
 
 help:
@@ -44,6 +44,7 @@ help:
 	@echo "  make faults        the cost of each fault on the skin's wires, as a table"
 	@echo "  make risk          how often certified errors, mean times and FRONT's intervals are not kept"
 	@echo "  make shifts        what touches unlike the training do to answers, and whether doubt tells it"
+	@echo "  make flags         are answers with a flag more often wrong? FLAGS=\"--recordings folders\" of a real skin"
 	@echo "  make remount       grasps of a real hand (REMOUNT=\"folders\") after it was taken off and put on"
 	@echo "  make stopping      deciding when sure beside fixed windows and extra trees"
 	@echo "  make soak          ten minutes of the loop in virtual time, and load on its page"
@@ -232,6 +233,9 @@ shifts: $(DEV) $(SIMULATED)/.made
 	$(BIN)/python -m export --data $(SIMULATED) --out $(OUT)/shifts $(EXPORT)
 	$(BIN)/python -m tests.bench.shifts --model $(OUT)/shifts/model.onnx
 
+flags: $(BENCHVENV)
+	$(BIN)/python -m tests.bench.flags $(FLAGS)
+
 # Each folder of DATA is a data set of its own; by default five seeds of the scene, with 140
 # trials each and with 560: STOPPING_TRIALS of each object in each condition.
 STOPPING_TRIALS ?= 5 20
@@ -280,7 +284,7 @@ soak: $(DEV)
 
 # Every table of docs/measured, one target after another, with a line for each as it ends. The
 # tables that this writes are no local change.
-ONLY ?= accuracy bench hard-cases kills risk shifts soak stopping transfer \
+ONLY ?= accuracy bench flags hard-cases kills risk shifts soak stopping transfer \
   docs/tradeoff.png
 measured: $(DEV)
 	@test -z "`git status --porcelain -uno -- . ':!docs/measured' ':!docs/*.png'`" || \

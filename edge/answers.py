@@ -7,7 +7,7 @@ from edge.events import Decided
 from edge.model.info import ModelInfo
 from edge.model.model import Decision, Model
 from edge.touch.contact import Contact, FeatureSeries
-from edge.touch.doubts import frame_doubts, is_several
+from edge.touch.doubts import frame_doubts
 
 
 def answers_about(
@@ -42,16 +42,13 @@ def answers_about(
         model=model.named,
     ).flagged(**contact_doubts(info, contact, series, window_s))
     if number is not None:
-        # Each region is a contact of its own.
-        answer = replace(answer, position=_position(contact)).flagged(several=False)
+        answer = replace(answer, position=_position(contact))
     try:
         vector = info.vector(series, window_s)
         decisions = model.decide(vector, point)
     except OutOfRange:
         answer = answer.flagged(out_of_range=True)
         return {task: replace(answer, task=task) for task in info.tasks}
-    if any(decision.label in info.several_labels for decision in decisions.values()):
-        answer = answer.flagged(several=False)
     if info.novelty is not None:
         score = next(iter(decisions.values())).novelty
         is_unusual = score > info.novelty.limits[point]
@@ -82,7 +79,6 @@ def contact_doubts(
         doubts |= joint_doubts(series, window_s, limits, info.still_s, info.speeds)
     return {
         **doubts,
-        "several": is_several(series.felt(window_s)),
         "missing_taxels": contact.missing_taxels,
         "missing_pose": contact.missing_pose,
         "late": contact.late,

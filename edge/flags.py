@@ -16,11 +16,6 @@ FLAGS = {
         "the arm came more slowly than in 99 % of the training trials, so that what it "
         "would still have moved may be called fixed; or faster than in 99 %, by 15 %"
     ),
-    "several": (
-        "a second region beside the contact in a fifth of the window, as fewer than a "
-        "fifth of the training trials with the named label had (of the task with the "
-        "most labels, such as the object)"
-    ),
     "still_joints": (
         "a joint's angle stays the same for longer than in 99 % of the training trials, "
         "by more than a 24th of the window: it has stopped, or comes late"

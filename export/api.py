@@ -100,7 +100,7 @@ def describe(fitted: Fitted, name: str | None = None) -> ModelInfo:
             "python": platform.python_version(),
             **{package: version(package) for package in packages},
         },
-        **usual_touches(dataset, list(fitted.classifier.choices), fitted.window_s),
+        **usual_touches(dataset, fitted.window_s),
         name=folder if name is None else name,
         trials=trials if sum(map(len, trials)) <= MOST_NAMES else (),
         **_calibration(fitted),

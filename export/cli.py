@@ -312,8 +312,7 @@ def _fit(arguments: argparse.Namespace) -> Fitted:
         point = front.pick(arguments.front)
         print(
             f"{arguments.front}: a window of {point.window_s:g} s, {front.task} "
-            f"{point.accuracy:.1%} ({100 * point.low:.0f} to {100 * point.high:.0f}) in "
-            f"{point.milliseconds:.0f} ms",
+            f"{point.accuracy:.1%} ({100 * point.low:.0f} to {100 * point.high:.0f})",
             file=sys.stderr,
         )
         window_s = point.window_s

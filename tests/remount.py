@@ -7,20 +7,16 @@ and as a remount leaves them: each joint's zero is off by 2 degrees, its gain by
 the clock by 5 %. Neighbouring joints err in opposite directions.
 """
 
-import tempfile
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
-import export
-import train
-from edge.model.model import Model
 from edge.recording import load
 from edge.saving import find
 from tests.bench import tables
 from tests.bench.program import start
-from tests.bench.shifts import answers, joints
+from tests.bench.shifts import answers, exported, joints
 
 
 def off(angles, by):
@@ -36,16 +32,17 @@ REMOUNTS = {
 }
 
 
+def halves(folder):
+    """The model of one half of a folder's recordings, and the other half."""
+    paths = find([folder])
+    return exported(paths[::2]), [*map(load, paths[1::2])]
+
+
 def measure(recordings):
     """Fit and decide, and write the table."""
     rows = []
     for folder in recordings:
-        paths = find([folder])
-        with tempfile.TemporaryDirectory() as out:
-            file = f"{out}/model.onnx"
-            export.save(file, train.fit(paths[::2], progress=False))
-            model = Model(file)
-        others = [*map(load, paths[1::2])]
+        model, others = halves(folder)
         for remount, change in REMOUNTS.items():
             judged = answers(model, map(change, others))["object"]
             right = judged["right"]

@@ -231,9 +231,6 @@ class ModelInfo:
     usual: Mapping[str, Sequence[float]] = field(default_factory=dict)
     """{feature: the least and the greatest mean over the full window of nearly all
     training trials}; empty without decision points."""
-    several_labels: Sequence[str] = ()
-    """Labels of the task with most labels whose training trials often have a second region
-    beside the contact."""
     still_s: Sequence[float] = ()
     """(dof,) seconds for which each joint stood still in nearly all training trials, at
     the longest."""

@@ -97,7 +97,6 @@ def _read(meta: ConfigTable) -> ModelInfo:
         name=meta.text("name", "", empty=True),
         trials=meta.texts("trials", ()),
         usual=_usual(meta, names),
-        several_labels=meta.texts("several_labels", ()),
         still_s=meta.numbers("still_s", default=()),
         speeds=meta.numbers("speeds", 2) if meta.has("speeds") else (),
     )

@@ -27,6 +27,8 @@ UNMEASURED = (
     "be held out."
 )
 
+UNDOUBTED = "It names every touch without a doubt, also those of things it has not met."
+
 
 def add_options(parser: argparse.ArgumentParser) -> None:
     """Add the command's options."""
@@ -86,7 +88,9 @@ def description(info: ModelInfo, about: dict[str, Any]) -> str:
 
 
 def doubt(stopping: Mapping[str, Stopping]) -> Iterator[str]:
-    """A sentence on what a calibrated model's doubt about names is worth."""
+    """A sentence on what a model's doubt about names is worth."""
+    if not stopping:
+        yield UNDOUBTED
     for task, of_task in stopping.items():
         if of_task.remoteness is not None:
             worth = of_task.remoteness.worth

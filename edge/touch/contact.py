@@ -48,7 +48,6 @@ class FeatureSeries:
             contact; NaN where the arm's pose was not known; 0 where it was not asked
             for.
         same: (n,) whether a frame repeats the one before it bit for bit.
-        beside: (n,) whether another region rises above the onset beside the contact.
         layout: the skin, with its thresholds.
         ended: the contact ended with the last frame.
         speed: of the joints before onset, see `Contact`.
@@ -71,7 +70,6 @@ class FeatureSeries:
     sums: Integers
     motion: Floats
     same: Booleans
-    beside: Booleans
     layout: SkinLayout
     ended: bool = False
     speed: float = math.nan
@@ -239,19 +237,16 @@ class Contact:
         if frame.valid is not None:
             self.missing_taxels |= bool((self.layout.alive & ~frame.valid).any())
         counted = [0] * PLAIN
-        beside = False
         if region is not None:
             self.region = region
             self.joints = frame.joints
             sums = region.sums if measurer.motion else (0, 0)
             counted = [region.peak, region.area, *sums]
-            beside = active.has_other(region, self.layout.onset)
         if measurer.zones is not None:
             counted += measurer.zones.measure(active, region, frame.shear)
         row: dict[str, Any] = {
             "t": age_s,
             "same": self._repeats(frame),
-            "beside": beside,
             "counted": np.array(counted, dtype=np.int64),
             **self._motions(frame, region, counted),
         }

@@ -20,13 +20,6 @@ PERIODS = 2.5
 """A pause of at most so many usual ones is no gap."""
 FEWEST = 4
 """Frames in a window that tell the usual pause."""
-BESIDE_SHARE = 0.2
-"""A second region counts if it is there in so much of the window."""
-
-
-def is_several(series: FeatureSeries) -> bool:
-    """Whether a second region was there in much of a window."""
-    return float(series.beside.mean()) >= BESIDE_SHARE
 
 
 def frame_doubts(series: FeatureSeries, window_s: float) -> dict[str, bool]:

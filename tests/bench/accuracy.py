@@ -21,10 +21,9 @@ from sklearn.model_selection import PredefinedSplit, cross_val_predict
 
 import edge
 import train
-from export.api import save
 from tests.bench import tables
 from tests.bench.program import start
-from tests.bench.shifts import decisions
+from tests.bench.shifts import decisions, exported
 from tests.other_skins import SKINS, touch
 from train.__main__ import main as train_command
 from train.data.folds import stratified_folds
@@ -84,7 +83,7 @@ def beside_peers(name):
         "recordings": name,
         "trials": len(labels),
         "labels": skin.objects,
-        "export": f"{exported(recordings, folds):.1%}",
+        "export": f"{of_folds(recordings, folds):.1%}",
         "MiniRocket, ridge": right(MiniRocketClassifier(random_state=0), X),
         "extra trees": right(
             ExtraTreesClassifier(300, random_state=0), X.reshape(len(X), -1)
@@ -92,15 +91,14 @@ def beside_peers(name):
     }
 
 
-def exported(recordings, folds):
+def of_folds(recordings, folds):
     """The share of touches that exports of the other folds decide rightly."""
     right = 0
     for fold in np.unique(folds):
         with tempfile.TemporaryDirectory() as folder:
             for i in np.flatnonzero(folds != fold):
                 edge.save(f"{folder}/{i:03}.npz", recordings[i])
-            save(f"{folder}/model.onnx", train.fit(folder, jobs=1))
-            model = edge.Model(f"{folder}/model.onnx")
+            model = exported(folder, jobs=1)
         touches = compress(recordings, folds == fold)
         answers = decisions(model, touches).drop_duplicates("touch")
         right += (answers["label"] == answers["truth"]).sum()

@@ -11,6 +11,8 @@ def kind_of(default):
     """How argparse takes an option."""
     if default is list:
         return {"nargs": "+", "required": True}
+    if default == []:
+        return {"nargs": "*", "default": default}
     if isinstance(default, type):
         return {"type": default, "required": True}
     if isinstance(default, bool):

@@ -35,12 +35,16 @@ from numpy.typing import NDArray
 from scipy.stats import binom
 
 from edge.early import fastest
-from edge.model.model import Model
 from edge.touch.features import SAMPLES, WINDOW_S
-from export.api import save
 from tests.bench import tables
 from tests.bench.program import start
-from tests.bench.shifts import FRESH_SEED, SCENE, decisions, fresh_touches
+from tests.bench.shifts import (
+    FRESH_SEED,
+    SCENE,
+    decisions,
+    exported,
+    fresh_touches,
+)
 from train.choose.candidates import candidates
 from train.data.dataset import DataSet, Measurement, load_trials
 from train.data.feature_sets import expand
@@ -201,18 +205,21 @@ def trust(right, confidence, unknown):
     }
 
 
-def exported(seed):
+def without_objects(seed):
+    """The model of a full export of a seed's data set without some objects, and the
+    names of these."""
+    scene = scenes.load(SCENE, seed=seed)
+    items = np.random.default_rng(seed).permutation(scene.objects)
+    with tempfile.TemporaryDirectory() as folder:
+        write(replace(scene, objects=tuple(items[NEVER_MET:])), folder)
+        return exported(folder, jobs=1), [item.name for item in items[:NEVER_MET]]
+
+
+def fully_exported(seed):
     """Rows of `trust` for each task of a full export of a seed's data set without some
     objects, on fresh touches of the others and of these; an unknown one is answered
     wrongly, with no confidence."""
-    scene = scenes.load(SCENE, seed=seed)
-    items = np.random.default_rng(seed).permutation(scene.objects)
-    left_out = [item.name for item in items[:NEVER_MET]]
-    with tempfile.TemporaryDirectory() as folder:
-        scene = replace(scene, objects=tuple(items[NEVER_MET:]))
-        write(scene, f"{folder}/data")
-        save(f"{folder}/model.onnx", fit(f"{folder}/data", jobs=1))
-        model = Model(f"{folder}/model.onnx")
+    model, left_out = without_objects(seed)
     fresh = fresh_touches(scenes.load(SCENE, seed=FRESH_SEED, count=FRESH))
     rows = decisions(model, fresh).drop_duplicates(["task", "touch"])
     rows["unknown"] = ["unknown" in flags for flags in rows["flags"]]
@@ -250,7 +257,7 @@ def measure(sets, exports):
     batches = workers.map("batches of trials", simulated, [(s,) for s in range(SEEDS)])
     results = workers.map("data sets", judged, drawn_sets(batches, sets))
     certified, fronts, trusted = map(chain.from_iterable, zip(*results, strict=True))
-    full = workers.map("full exports", exported, [(s,) for s in range(exports)])
+    full = workers.map("full exports", fully_exported, [(s,) for s in range(exports)])
     trusted = [*trusted, *chain.from_iterable(full)]
     certified = summed_up(certified, ["task", "asked"], certificate)
     fronts = summed_up(fronts, ["task", "front"], interval)

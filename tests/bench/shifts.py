@@ -23,6 +23,7 @@ touches:
   box" and "foam block". Each is less remote than half of the touches of known things.
 """
 
+import tempfile
 from dataclasses import replace
 from functools import partial
 from itertools import chain
@@ -34,9 +35,11 @@ import pandas as pd
 from edge.classifier import Classifier
 from edge.events import Decided
 from edge.model.model import Model
+from export.api import save
 from tests.bench import tables
 from tests.bench.program import start
 from train.data.parts import part
+from train.fitting import fit
 from train.progress import bar
 from train.simulate import scene as scenes
 from train.simulate.engine import run_physics
@@ -178,10 +181,10 @@ def redone(scene, usual):
     return [r for _, r in recordings(run_physics(scene, tuple(specs)))]
 
 
-def decisions(model, recordings):
+def decisions(model, recordings, error=None):
     """A row for each decision on recordings, with the number of the touch and its true
     label; a touch that is not felt has none."""
-    classifier = Classifier(model)
+    classifier = Classifier(model, error=error)
     rows = []
     for touch, recording in enumerate(recordings):
         for event in classifier.classify(recording):
@@ -246,21 +249,33 @@ def row(name, task, judged, usual):
     }
 
 
+def exported(data, **options):
+    """The model of an export of recordings."""
+    with tempfile.TemporaryDirectory() as folder:
+        save(f"{folder}/model.onnx", fit(data, **options))
+        return Model(f"{folder}/model.onnx")
+
+
+def cases(scene):
+    """(a shift, its touches) for each; the first is none."""
+    fresh = fresh_touches(scene)
+    made = {name: partial(map, shift, fresh) for name, shift in SHIFTS.items()}
+    for name, changed in scene_changes(scene).items():
+        made[name] = partial(redone, changed, fresh)
+    objects = scenes.load(STRANGE, seed=FRESH_SEED).objects
+    never_met = replace(scene, objects=objects, trials={**scene.trials, "count": 1})
+    made[NEVER_MET] = partial(fresh_touches, never_met)
+    for name, make in bar(made.items(), total=len(made)):
+        yield name, list(make())
+
+
 def measure(model):
     """Measure, and write the table."""
     loaded = Model(model)
-    scene = scenes.load(SCENE, seed=FRESH_SEED, count=5)
-    fresh = fresh_touches(scene)
-    cases = {name: partial(map, shift, fresh) for name, shift in SHIFTS.items()}
-    for name, changed in scene_changes(scene).items():
-        cases[name] = partial(redone, changed, fresh)
-    objects = scenes.load(STRANGE, seed=FRESH_SEED).objects
-    never_met = replace(scene, objects=objects, trials={**scene.trials, "count": 1})
-    cases[NEVER_MET] = partial(fresh_touches, never_met)
     rows = []
     usual = {}
-    for name, shifted in bar(cases.items(), total=len(cases)):
-        for task, judged in answers(loaded, shifted()).items():
+    for name, shifted in cases(scenes.load(SCENE, seed=FRESH_SEED, count=5)):
+        for task, judged in answers(loaded, shifted).items():
             accuracy = usual.setdefault(task, trusted(judged))
             rows.append(row(name, task, judged, accuracy))
     tables.write("shifts", [rows], "make shifts")

@@ -12,6 +12,7 @@ the trees, and than the trees whose set is chosen. Standard errors are those of 
 paired differences over the data sets.
 """
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -27,11 +28,12 @@ from tests.bench.program import start
 from train.data.dataset import read
 from train.data.feature_sets import expand
 from train.data.folds import finest, stratified_folds
+from train.data.groups import TRIAL
 from train.model.rules import NEVER, THRESHOLDS
 from train.report.work import Workers
 from train.tradeoff.choices import WINDOWS_S as DECISION_POINTS_S
 from train.tradeoff.choices import followed
-from train.tradeoff.early import FOLDS, compare_stopping
+from train.tradeoff.early import FOLDS, left_out
 
 SECONDS = np.array(DECISION_POINTS_S)
 SETS = (
@@ -129,7 +131,8 @@ def our_curves(ours):
     sure = []
     for threshold in (NEVER, *THRESHOLDS.tolist()):
         rule = StoppingRule(1.0, 0.0, threshold, len(SECONDS) - 1)
-        stops, wrong = ours.course.under(rule)
+        # A label counts even where the contact is unlike all trained ones.
+        stops, wrong = replace(ours.course, withheld=None).under(rule)
         sure.append((SECONDS[stops].mean(), wrong.mean()))
     return {FIXED: [fixed], SURE: [sure]}
 
@@ -145,7 +148,13 @@ def judge(data, quick, jobs):
         names = expand(sets.split())
         vectors = [dataset.features(s, SAMPLES, names) for s in DECISION_POINTS_S]
         by_set.append(np.stack(vectors))
-    compared = compare_stopping(dataset, DECISION_POINTS_S, quick=quick, jobs=jobs)
+    options = {
+        "leave_out": TRIAL,
+        "decision_points_s": DECISION_POINTS_S,
+        "tasks": tuple(y),
+        "quick": quick,
+    }
+    compared = left_out(dataset, folds, options, jobs)
     cases = [(by_set, y[task], folds) for task in compared]
     rivals = Workers(jobs).map("peers", peers, cases)
     curves = {}

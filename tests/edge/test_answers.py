@@ -78,21 +78,6 @@ def test_a_gap_in_the_window_flags_the_decision(model, make_touch):
     assert ["gap" in event.flags for event in events] == [True] * 2
 
 
-@pytest.mark.parametrize("label", ["soft 0", "none"])
-def test_a_second_region_is_a_doubt_unless_the_named_label_often_had_one(
-    exported,
-    make_touch,
-    label,
-):
-    model = Model(exported / "model.onnx")
-    model.info = replace(model.info, several_labels=(label,))
-    touch = make_touch(kind="soft", seed=99)
-    touch.frames[:, :2, 12:14] = 2 * touch.frames.max(axis=(1, 2))[:, None, None] // 3
-    events = decided(model, touch)
-    assert [event.label for event in events] == ["soft-fixed", "soft 0"]
-    assert ["several" in event.flags for event in events] == [label == "none"] * 2
-
-
 def test_joint_angles_are_compared_with_those_of_training(model):
     contact = SimpleNamespace(
         missing_taxels=False, missing_pose=False, late=False, chain=None

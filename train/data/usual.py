@@ -1,22 +1,16 @@
 """How the training touches were made, against which the board doubts others.
 
-It compares a second region beside the contact, the standstill of joints, and the speed
-at which the arm came.
+It compares the standstill of joints, and the speed at which the arm came.
 """
 
-from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
 from edge.touch.contact import FeatureSeries
-from edge.touch.doubts import is_several
 from edge.touch.joint_doubts import still_times
 from train.data.dataset import DataSet
-from train.data.folds import finest
 
-OFTEN = 0.2
-"""A second region is no doubt for a label if so many of its trials had one."""
 SELDOM = 0.01
 """Share of the trials that may lie outside of a usual range, on one side."""
 SLOWER = 0.97
@@ -29,16 +23,10 @@ RESTS = 0.01
 """Radians a second that the encoders of an arm at rest may show."""
 
 
-def usual_touches(
-    dataset: DataSet,
-    tasks: Sequence[str],
-    window_s: float,
-) -> dict[str, Any]:
+def usual_touches(dataset: DataSet, window_s: float) -> dict[str, Any]:
     """{field of `edge.model.info.ModelInfo`: what the training touches showed}."""
     series = [trial.series for trial in dataset.trials]
-    labels = dataset.labels(finest({task: dataset.labels(task) for task in tasks}))
     usual: dict[str, Any] = {}
-    usual["several_labels"] = _often_several(labels.tolist(), series, window_s)
     rests = [_still_times(touch, window_s) for touch in series]
     if any(rests):
         longest = np.quantile(rests, 1.0 - SELDOM, axis=0)
@@ -48,19 +36,6 @@ def usual_touches(
         low, high = np.nanquantile(speeds, (SELDOM, 1.0 - SELDOM))
         usual["speeds"] = SLOWER * float(low), FASTER * float(high) + RESTS
     return usual
-
-
-def _often_several(
-    labels: Sequence[str],
-    series: Sequence[FeatureSeries],
-    window_s: float,
-) -> tuple[str, ...]:
-    """The labels of which `OFTEN` or more of the trials have a second region."""
-    several: dict[str, list[bool]] = {}
-    for label, touch in zip(labels, series, strict=True):
-        several.setdefault(label, []).append(is_several(touch.felt(window_s)))
-    often = [label for label, trials in several.items() if np.mean(trials) >= OFTEN]
-    return tuple(sorted(filter(None, often)))
 
 
 def _still_times(touch: FeatureSeries, window_s: float) -> list[float]:

@@ -60,8 +60,8 @@ def summary(fitted: Fitted, prices: Prices) -> str:
     if any(map(moves, map(measures.feature, fitted.dataset.names))):
         frame = "along the skin" if fitted.dataset.chain is None else "in the world"
         lines.append(f"contact motion is measured {frame}")
-    if fitted.sequential is not None:
-        lines += doubt(fitted.sequential.stopping_)
+    sequential = fitted.sequential
+    lines += doubt({} if sequential is None else sequential.stopping_)
     return "\n".join([*lines, *fitted.notes, *warnings(fitted)])
 
 

@@ -10,7 +10,6 @@ import numpy as np
 
 from edge.touch.features import WINDOW_S
 from edge.touch.layout import SkinLayout
-from train.choose.evaluate import Result
 from train.choose.options import FitOptions, Loaded, features_tried, trials_of
 from train.choose.settings import Chosen
 from train.choose.windows import windows_of
@@ -122,6 +121,6 @@ def differ(before: Chosen, after: Chosen) -> bool:
     return low > 0.0 or high < 0.0
 
 
-def unseen(choice: Chosen) -> Result | None:
+def unseen(choice: Chosen) -> float | None:
     """The accuracy on unseen objects; None if no objects could be held out."""
-    return None if choice.left_out == TRIAL else choice.accuracy
+    return None if choice.left_out == TRIAL else choice.accuracy.accuracy

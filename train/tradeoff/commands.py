@@ -1,8 +1,13 @@
 """The commands that the report prints: complete, so that a copy does what it says."""
 
+import os
 import shlex
+import sys
 from dataclasses import dataclass
 from pathlib import Path
+
+PROGRAM = shlex.quote(os.path.relpath(Path(sys.executable).with_name("edge-classify")))
+"""Runs in a shell that knows nothing of the environment."""
 
 
 @dataclass(frozen=True)
@@ -11,6 +16,7 @@ class Commands:
 
     Attributes:
         data: recordings and folders, as they were named.
+        touch: one of the recordings.
         out: folder of the report.
         board: the board file.
         quick: whether the report's choices are quick ones.
@@ -18,6 +24,7 @@ class Commands:
     """
 
     data: tuple[str, ...]
+    touch: Path
     out: Path
     board: Path
     quick: bool = False
@@ -34,19 +41,21 @@ class Commands:
         return f"{self._export} --front {point} --fronts {file}"
 
     def run(self, error: float) -> str:
-        """The command that decides early with the exported model, less its skin."""
+        """The command that decides early with the exported model, on a recording in
+        place of the skin."""
         model = shlex.quote(str(self._models / "model.onnx"))
-        return f"edge-classify run --model {model} --error {error:g}"
+        touch = shlex.quote(str(self.touch))
+        return f"{PROGRAM} run --model {model} --error {error:g} --fake {touch}"
 
     def tradeoff(self, options: str) -> str:
         """The command that makes this report with other options."""
-        words = ["python", "-m", "train", "tradeoff", "--data", *self.data]
+        words = ["--data", *self.data]
         words += ["--board", str(self.board), "--out", str(self.out)]
         if self.quick:
             words.append("--quick")
         if self.task is not None:
             words += ["--task", self.task]
-        return f"{shlex.join(words)} {options}"
+        return f"{PROGRAM} tradeoff {shlex.join(words)} {options}"
 
     @property
     def _models(self) -> Path:
@@ -57,4 +66,4 @@ class Commands:
     def _export(self) -> str:
         """The program that exports, with its data and folder."""
         data = shlex.join(self.data)
-        return f"python -m export --data {data} --out {shlex.quote(str(self._models))}"
+        return f"{PROGRAM} export --data {data} --out {shlex.quote(str(self._models))}"

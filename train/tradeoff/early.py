@@ -1,4 +1,9 @@
-"""Early decisions compared with fixed windows, on held-out trials."""
+"""Early decisions with certified error rates, of known objects and of unseen ones.
+
+The rules, their certified errors and their mean times are those of the export of all
+contacts, which its file keeps. How often they decide rightly is tested on contacts, and
+on entire objects, by exports without them.
+"""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -6,58 +11,41 @@ from typing import Any
 
 import numpy as np
 
-from edge.arrays import Booleans, Floats
+from edge.arrays import Booleans, Integers
 from edge.early import fastest
 from edge.model.info import Stopping
-from edge.statistics import Z
-from train.choose.evaluate import VARIANCE, Promise, Result
+from train.choose.evaluate import Promise, Result
 from train.data.dataset import DataSet
 from train.data.folds import finest, stratified_folds
-from train.data.groups import TRIAL
+from train.data.groups import LEAVE_OUT, TRIAL, groups_of
 from train.fitting import fit
 from train.model.rules import Course, candidates
 from train.report.score import paired
 from train.report.work import Workers
 
-ERRORS = (0.05, 0.1, 0.15, 0.2, 0.25, 0.3)
 FOLDS = 5
-BINS = 10
+ERRORS = (0.05, 0.1, 0.15, 0.2, 0.25, 0.3)
 
 
 @dataclass(frozen=True)
 class Certified:
-    """Decisions with an error rate that the model of all contacts certifies.
-
-    Each contact is decided by a model of the other folds, at the confidence that the
-    model of all contacts asks for.
+    """Decisions with an error rate that an export certifies.
 
     Attributes:
         error: the requested rate.
-        right: (n,) whether each contact is decided rightly. A contact unlike all
-            trained ones gets no label, which counts as wrong.
+        mean_s: mean time to decision, which the exported model promises.
+        right: (n,) whether each contact is decided rightly by a model without it. A
+            thing that is unknown gets no name, which counts as wrong.
         waited: (n,) whether the same contact is decided rightly at the full window.
-        unknown: share of decisions without a label.
-        seconds: (n,) time of each decision.
+        unseen: (m,) whether each contact is decided rightly by a model without its
+            object; None where no objects could be left out.
     """
 
     error: float
+    mean_s: float
     right: Booleans
     waited: Booleans
-    unknown: float
-    seconds: Floats
-
-    @property
-    def mean_s(self) -> float:
-        """Mean time to decision."""
-        return float(self.seconds.mean())
-
-    @property
-    def latest_s(self) -> float:
-        """Upper end of the 95 % interval for the exported model's mean time on other
-        contacts. It has no lower end, as the exported model was fitted on more trials
-        and is sure sooner than those of the folds."""
-        variance = VARIANCE * float(self.seconds.var()) / len(self.seconds)
-        return self.mean_s + Z * float(np.sqrt(variance))
+    unseen: Booleans | None = None
 
     @property
     def result(self) -> Result:
@@ -71,172 +59,134 @@ class Certified:
         return paired(self.waited, self.right)
 
 
-@dataclass(frozen=True)
-class StoppingComparison:
-    """Early decisions and decisions after fixed windows, on the same held-out trials.
-
-    Attributes:
-        decision_points_s: the windows.
-        right: (decision points, n) whether each fixed window's decision is right.
-        confidence: (decision points, n) calibrated.
-        course: of all held-out trials, whose labels count even where the contact is
-            unlike all trained ones.
-        certified: an entry for each requested error rate that the model of all
-            contacts certifies.
-    """
-
-    decision_points_s: tuple[float, ...]
-    right: Booleans
-    confidence: Floats
-    course: Course
-    certified: list[Certified]
-
-    @property
-    def calibration_error(self) -> float:
-        """Expected calibration error: the mean gap between confidence and share of
-        right decisions, in equal ranges of confidence."""
-        confidence = self.confidence.reshape(-1)
-        right = self.right.reshape(-1)
-        ranges = np.minimum((confidence * BINS).astype(int), BINS - 1)
-        gaps = np.bincount(ranges, confidence - right)
-        return float(np.abs(gaps).sum() / len(right))
-
-
-def soonest(compared: StoppingComparison, level: float) -> Certified | None:
-    """The early decisions of an accuracy with the shortest mean time; None where none
-    have it."""
-    able = [rule for rule in compared.certified if rule.result.accuracy >= level]
+def soonest(rules: Sequence[Certified], level: float) -> Certified | None:
+    """The decisions of an accuracy with the shortest mean time; None where none have
+    it."""
+    able = [rule for rule in rules if rule.result.accuracy >= level]
     return min(able, key=lambda rule: rule.mean_s, default=None)
 
 
-def compare_stopping(
+def certified(
     dataset: DataSet,
     decision_points_s: Sequence[float],
     *,
     quick: bool = True,
     jobs: int = 1,
-    certify: bool = False,
-) -> dict[str, StoppingComparison]:
-    """{task: early decisions compared with fixed windows}.
-
-    Each fold is held out once, and an export of the other folds decides its trials.
+) -> dict[str, list[Certified]]:
+    """{task: its decisions at each error rate that an export certifies}.
 
     Args:
         dataset: the trials.
-        decision_points_s: the windows.
+        decision_points_s: windows.
         quick: whether the export tries few candidates.
         jobs: processes.
-        certify: export all trials too, to tell which error rates can be requested.
     """
     y = {task: dataset.labels(task) for task in dataset.tasks}
-    folds = stratified_folds(y[finest(y)], FOLDS)
-    options: dict[str, Any] = {
+    options = {
         "leave_out": TRIAL,
         "decision_points_s": decision_points_s,
         "tasks": tuple(y),
         "quick": quick,
-        "jobs": 1,
     }
-    cases = [(dataset, folds == k, options) for k in range(FOLDS)]
-    held_out = Workers(jobs).map("deciding early", _held_out, cases)
-    rules: Mapping[str, Stopping] = {}
-    if certify:
-        model = fit(dataset, **{**options, "jobs": jobs}).sequential
-        assert model is not None
-        rules = model.stopping_
+    model = fit(dataset, **options, jobs=jobs).sequential
+    assert model is not None
+    folds = stratified_folds(y[finest(y)], FOLDS)
+    known = left_out(dataset, folds, options, jobs)
+    unseen: dict[str, LeftOut] = {}
+    groups = groups_of(dataset, y, LEAVE_OUT, quick=True)
+    if groups is not None:
+        by_task = left_out(dataset, groups.folds, options, jobs)
+        unseen = {task: by_task[task] for task in groups.tasks}
     return {
-        task: _compared(task, held_out, decision_points_s, rules.get(task))
-        for task in y
+        task: at_errors(stopping, known[task], unseen.get(task))
+        for task, stopping in model.stopping_.items()
     }
 
 
 @dataclass(frozen=True)
-class _HeldOut:
-    """A fold's trials, decided by a model that was fitted without them.
+class LeftOut:
+    """A task's decisions by models that were fitted without what they decide.
 
     Attributes:
-        test: (n,) which trials they are.
-        right, confidence: {task: (decision points, m)}.
-        courses: {task: of the fold's trials}.
+        right: (decision points, n) whether each fixed window's label is right.
+        course: the same with confidences, which tell when a rule decides.
     """
 
-    test: Booleans
-    right: Mapping[str, Booleans]
-    confidence: Mapping[str, Floats]
-    courses: Mapping[str, Course]
+    right: Booleans
+    course: Course
 
 
-def _held_out(dataset: DataSet, test: Booleans, options: Mapping[str, Any]) -> _HeldOut:
-    """A fold's trials, decided by a model that was fitted without them (`judged`)."""
-    fitted = fit(dataset.part(~test), **options)
+def left_out(
+    dataset: DataSet, folds: Integers, options: Mapping[str, Any], jobs: int
+) -> dict[str, LeftOut]:
+    """{task: decisions of the trials of each fold (n,) by an export of the others}.
+
+    Args:
+        dataset: the trials.
+        folds: of trials, or of entire groups of them.
+        options: of the export.
+        jobs: processes.
+    """
+    cases = [(dataset, folds == fold, options) for fold in np.unique(folds)]
+    of_folds = Workers(jobs).map("deciding early", _without, cases)
+    return {
+        task: _joined([of_fold[task] for of_fold in of_folds]) for task in of_folds[0]
+    }
+
+
+def _without(
+    dataset: DataSet, test: Booleans, options: Mapping[str, Any]
+) -> dict[str, LeftOut]:
+    """{task: the decisions of some trials by an export of the others}."""
+    fitted = fit(dataset.part(~test), **options, jobs=1)
     model = fitted.sequential
-    test_set = replace(dataset.part(test), kernels=fitted.dataset.kernels)
     assert model is not None
+    test_set = replace(dataset.part(test), kernels=fitted.dataset.kernels)
     names = fitted.dataset.names
     points = model.decision_points_s
     new = np.stack([test_set.features(s, fitted.samples, names) for s in points])
     truth = {task: test_set.labels(task) for task in model.choices}
-    return _HeldOut(test, *model.judged(new, truth))
+    right, _, courses = model.judged(new, truth)
+    return {task: LeftOut(right[task], course) for task, course in courses.items()}
 
 
-def _compared(
-    task: str,
-    folds: Sequence[_HeldOut],
-    decision_points_s: Sequence[float],
-    stopping: Stopping | None,
-) -> StoppingComparison:
-    """A task's early decisions over all folds, by the rules of the model of all
-    contacts."""
-    shape = len(decision_points_s), len(folds[0].test)
-    right = np.empty(shape, dtype=bool)
-    confidence = np.empty(shape)
-    for fold in folds:
-        right[:, fold.test] = fold.right[task]
-        confidence[:, fold.test] = fold.confidence[task]
-    course = _joined([fold.courses[task] for fold in folds])
-    points = tuple(decision_points_s)
-    certified = [] if stopping is None else _certified(course, stopping, points)
-    shown = replace(course, withheld=None)
-    return StoppingComparison(points, right, confidence, shown, certified)
-
-
-def _joined(courses: Sequence[Course]) -> Course:
-    """The course of several folds together."""
+def _joined(folds: Sequence[LeftOut]) -> LeftOut:
+    """The decisions of several folds together."""
+    courses = [fold.course for fold in folds]
     confidences = zip(*(course.confidences for course in courses), strict=True)
     wrong = zip(*(course.wrong for course in courses), strict=True)
     withheld = [course.withheld for course in courses if course.withheld is not None]
-    return Course(
+    course = Course(
         confidences=list(map(np.hstack, confidences)),
         wrong=list(map(np.hstack, wrong)),
         unusual=np.hstack([course.unusual for course in courses]),
         withheld=np.hstack(withheld) if withheld else None,
     )
+    return LeftOut(np.hstack([fold.right for fold in folds]), course)
 
 
-def _certified(
-    course: Course, stopping: Stopping, decision_points_s: Sequence[float]
+def at_errors(
+    stopping: Stopping, known: LeftOut, unseen: LeftOut | None = None
 ) -> list[Certified]:
     """The decisions at each error rate that a model certifies; one rule that serves
-    several rates stands at the smallest."""
-    seconds = np.array(decision_points_s)
-    waiting, _ = candidates(len(seconds))
-    _, late = course.under(waiting)
+    several rates stands at the smallest.
+
+    Args:
+        stopping: the model's rules.
+        known: decisions of known objects.
+        unseen: those of objects that were left out.
+    """
+    waiting, _ = candidates(len(known.right))
+    _, late = known.course.under(waiting)
     rules = {fastest(stopping, error): error for error in reversed(ERRORS)}
-    certified = []
+    decisions = []
     for rule, error in reversed(rules.items()):
         if rule is None:
             continue
-        at, wrong = course.under(rule)
-        unknown = 0.0
-        if course.withheld is not None:
-            unknown = float(course.withheld[at, np.arange(len(at))].mean())
-        certified.append(
-            Certified(
-                error=error,
-                right=~wrong,
-                waited=~late,
-                unknown=unknown,
-                seconds=seconds[at],
-            )
-        )
-    return certified
+        _, wrong = known.course.under(rule)
+        right = None
+        if unseen is not None:
+            _, missed = unseen.course.under(rule)
+            right = ~missed
+        decisions.append(Certified(error, rule.mean_s, ~wrong, ~late, right))
+    return decisions

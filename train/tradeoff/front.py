@@ -24,13 +24,11 @@ class OperatingPoint:
 
     Attributes:
         window_s: seconds from onset that a decision waits for.
-        milliseconds: from onset to decision.
         accuracy: nested accuracy of the entire choice on left-out trials, 0 to 1.
         low, high: 95 % interval of the exported model's accuracy.
     """
 
     window_s: float
-    milliseconds: float
     accuracy: float
     low: float
     high: float
@@ -39,7 +37,7 @@ class OperatingPoint:
         """Raise ValueError for a time or a share that no decision has."""
         shares = (self.accuracy, self.low, self.high)
         possible = all(0.0 <= share <= 1.0 for share in shares)
-        if not (possible and 0.0 < self.window_s <= 60.0 and self.milliseconds > 0.0):
+        if not (possible and 0.0 < self.window_s <= 60.0):
             raise ValueError("a point of an impossible time or accuracy")
 
 
@@ -62,7 +60,6 @@ class ParetoFront:
         cls,
         points: Points,
         task: str,
-        after_s: float = 0.0,
         *,
         quick: bool = False,
     ) -> ParetoFront:
@@ -71,7 +68,6 @@ class ParetoFront:
         Args:
             points: the choices at each window, the shortest first.
             task: the task whose accuracy counts.
-            after_s: seconds from the end of a window to the decision.
             quick: whether the choices are quick ones.
         """
         best: list[OperatingPoint] = []
@@ -79,14 +75,13 @@ class ParetoFront:
             result = tasks[task].by_trial
             accuracy = result.accuracy
             if not best or accuracy > best[-1].accuracy:
-                ms = round(1e3 * (window_s + after_s), 2)
-                best.append(OperatingPoint(window_s, ms, accuracy, *result.interval))
+                best.append(OperatingPoint(window_s, accuracy, *result.interval))
         return cls(task, tuple(best), quick)
 
     def to_dict(self, digest: str) -> dict[str, Any]:
         """The contents of front.json, for recordings with a digest."""
         return {
-            "format": 3,
+            "format": 4,
             "task": self.task,
             "data_digest": digest,
             "quick": self.quick,
@@ -125,7 +120,7 @@ class ParetoFront:
                 f"{path}: was measured on other recordings (digest {measured[:12]}, "
                 f"these have {digest[:12]}); {remedy} DATA=... of these"
             )
-        fastest_first = sorted(points, key=lambda point: point.milliseconds)
+        fastest_first = sorted(points, key=lambda point: point.window_s)
         return cls(task, tuple(fastest_first), quick)
 
     def pick(self, wish: str) -> OperatingPoint:
@@ -134,9 +129,9 @@ class ParetoFront:
         Args:
             wish: `fast` (the fastest), `accurate` (the most accurate), `balanced`
                 (the most accurate with a window of at most `BALANCED_S`, or else the
-                fastest), a number above 1 (the most accurate within so many
-                milliseconds), or a number from 0 to 1 (the fastest that reaches this
-                accuracy).
+                fastest), a number above 1 (the most accurate with a window of at most
+                so many milliseconds), or a number from 0 to 1 (the fastest that reaches
+                this accuracy).
 
         Raises:
             InputError: `wish` has another form, or no point is as fast or as accurate.
@@ -148,11 +143,11 @@ class ParetoFront:
         if wish == "accurate":
             return last
         if wish == "balanced":
-            return self._last_within("window_s", BALANCED_S) or first
+            return self._last_within(BALANCED_S) or first
         number = _number(wish)
         if number > 1.0:
-            point = self._last_within("milliseconds", number)
-            limit = f"the fastest point takes {first.milliseconds:.0f} ms"
+            point = self._last_within(1e-3 * number)
+            limit = f"the fastest point takes {1e3 * first.window_s:.0f} ms"
         else:
             able = (point for point in self.points if point.accuracy >= number)
             point = next(able, None)
@@ -161,9 +156,9 @@ class ParetoFront:
             raise InputError(f"--front {wish}: {limit}")
         return point
 
-    def _last_within(self, field: str, limit: float) -> OperatingPoint | None:
-        """The most accurate point of which a field is within a limit."""
-        able = [point for point in self.points if getattr(point, field) <= limit]
+    def _last_within(self, limit_s: float) -> OperatingPoint | None:
+        """The most accurate point with a window of at most `limit_s`."""
+        able = [point for point in self.points if point.window_s <= limit_s + 1e-9]
         return able[-1] if able else None
 
 

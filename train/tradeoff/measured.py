@@ -9,7 +9,7 @@ from train.report.section import Row
 from train.tradeoff.board import Board
 from train.tradeoff.choices import Points
 from train.tradeoff.commands import Commands
-from train.tradeoff.early import StoppingComparison
+from train.tradeoff.early import Certified
 
 
 @dataclass(frozen=True)
@@ -22,7 +22,7 @@ class Measured:
         wire_s: from the end of the window until its last frame is read; None where the
             recordings do not tell the skin's wires.
         points: the choice at each window.
-        comparisons: {task: early decisions compared with fixed windows}.
+        certified: {task: its decisions at each error rate that is certified}.
         costs: a row for each change of the choice at the usual window
             (`costs.measure`).
         commands: that make these models.
@@ -35,18 +35,12 @@ class Measured:
     board: Board
     wire_s: float | None
     points: Points
-    comparisons: Mapping[str, StoppingComparison]
+    certified: Mapping[str, Sequence[Certified]]
     costs: Sequence[Row]
     commands: Commands
     notes: Sequence[str] = ()
     wrong: float = 10.0
     second: float = 1.0
-
-    @property
-    def after_s(self) -> float:
-        """Seconds from the end of the window to the decision, as far as they are
-        known."""
-        return (self.wire_s or 0.0) + self.board.arithmetic_s
 
     def results(self, task: str) -> dict[float, Result]:
         """{window: accuracy of a task on left-out trials}."""

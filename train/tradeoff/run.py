@@ -95,13 +95,7 @@ def tradeoff(data: Sequence[str], out: Path, board_path: str, options: Options) 
     main = _main_task(dataset, options.task)
     points = choices_at(dataset, ready.windows, main, workers, quick=quick)
     rate = _rate_hz(raw.recordings)
-    comparisons = early.compare_stopping(
-        dataset,
-        WINDOWS_S,
-        quick=quick,
-        jobs=options.jobs,
-        certify=True,
-    )
+    certified = early.certified(dataset, WINDOWS_S, quick=quick, jobs=options.jobs)
     rows = costs.measure(raw, dataset, points, rate, workers, quick=quick)
     order = sorted(dataset.tasks, key=lambda task: (task != main, task))
     measured = Measured(
@@ -109,12 +103,13 @@ def tradeoff(data: Sequence[str], out: Path, board_path: str, options: Options) 
         board=board,
         wire_s=wire_time_s(raw.recordings, dataset.layout, rate),
         points=points,
-        comparisons=comparisons,
+        certified=certified,
         costs=rows,
         wrong=options.wrong,
         second=options.second,
         commands=Commands(
             data=tuple(map(str, data)),
+            touch=raw.paths[0],
             out=out,
             quick=quick,
             board=Path(board_path),
@@ -123,7 +118,7 @@ def tradeoff(data: Sequence[str], out: Path, board_path: str, options: Options) 
         notes=ready.notes,
     )
     report = _write(measured, out, counted(len(dataset.trials), "contact"))
-    front = ParetoFront.of(points, main, measured.after_s, quick=quick)
+    front = ParetoFront.of(points, main, quick=quick)
     text = json.dumps(front.to_dict(dataset.digest), indent=1)
     with write_whole(out / "front.json") as file:
         file.write(text.encode() + b"\n")

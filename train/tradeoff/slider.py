@@ -14,7 +14,7 @@ from train.tradeoff.choices import unseen
 from train.tradeoff.early import soonest
 from train.tradeoff.front import NAMES, ParetoFront
 from train.tradeoff.measured import Measured
-from train.tradeoff.uses import cheapest, early, fixed
+from train.tradeoff.uses import Use, cheapest, early, fixed
 
 FIRST_S = 1.0
 """The time shown at first; without a script, it stays."""
@@ -83,18 +83,16 @@ def reached(measured: Measured, level: float) -> str:
     early and after a fixed time, with their commands."""
     rows = ""
     for task in measured.y:
-        rule = soonest(measured.comparisons[task], level)
+        rule = soonest(measured.certified[task], level)
         if rule is not None:
-            time = (
-                f"{rule.mean_s:.2f} s on average (at most {rule.latest_s:.2f}), early"
-            )
             use = early(measured, rule)
-            rows += _row(task, f"after {time}: {_accuracy(use.result)}", use.commands)
+            time = f"after {use.seconds:.2f} s on average, early"
+            rows += _row(task, f"{time}: {_accuracy(use)}", use.commands)
         results = measured.results(task)
         able = [window for window in results if results[window].accuracy >= level]
         if able:
             use = fixed(measured, task, min(able))
-            answer = f"after {min(able):g} s, fixed: {_accuracy(use.result)}"
+            answer = f"after {min(able):g} s, fixed: {_accuracy(use)}"
             rows += _row(task, answer, use.commands)
         elif rule is None:
             rows += _row(task, "never", ())
@@ -108,26 +106,27 @@ def _row(name: str, answer: str, commands: Sequence[str]) -> str:
     return f"<tr>{''.join(f'<td>{cell}</td>' for cell in cells)}</tr>"
 
 
-def _accuracy(result: Result) -> str:
-    """An accuracy and its interval in whole percent."""
-    return f"{100 * result.accuracy:.0f} % ({interval(result)})"
+def _accuracy(use: Use) -> str:
+    """An accuracy with its interval, and that on unseen objects, in whole percent."""
+    text = f"{100 * use.result.accuracy:.0f} % ({interval(use.result)})"
+    if use.unseen is not None:
+        text += f", {100 * use.unseen:.0f} % of unseen objects"
+    return text
 
 
 def fronts(measured: Measured) -> str:
     """Rows of a table for the main task: what the names of `FRONT=` give, and the
     cheapest use."""
     task = next(iter(measured.y))
-    results = measured.results(task)
-    front = ParetoFront.of(measured.points, task, measured.after_s)
+    front = ParetoFront.of(measured.points, task)
     rows = ""
     for name in NAMES:
-        point = front.pick(name)
-        answer = _accuracy(results[point.window_s])
-        text = f"{task}: {answer} after {point.milliseconds / 1e3:.2f} s"
+        use = fixed(measured, task, front.pick(name).window_s)
+        text = f"{task}: {use.name}: {_accuracy(use)}"
         rows += _row(name, text, (measured.commands.front(name),))
     best = cheapest(measured, task)
     text = (
-        f"{task}: {_accuracy(best.result)} after {best.seconds:.2f} s, where a wrong "
+        f"{task}: after {best.seconds:.2f} s: {_accuracy(best)}, where a wrong "
         f"decision costs {measured.wrong:g} and a second of waiting {measured.second:g}"
     )
     return rows + _row("cheapest", text, best.commands)
@@ -136,14 +135,12 @@ def fronts(measured: Measured) -> str:
 def _texts(choice: Chosen) -> dict[str, str]:
     """{class in the page: accuracy, its interval, or accuracy on unseen objects, as
     text}."""
-    unseen_result = unseen(choice)
+    share = unseen(choice)
     result = choice.by_trial
     return {
         "share": f"{100 * result.accuracy:.0f} %",
         "interval": f"({interval(result)})",
-        "unseen": ""
-        if unseen_result is None
-        else f"{100 * unseen_result.accuracy:.0f} %",
+        "unseen": "" if share is None else f"{100 * share:.0f} %",
     }
 
 

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 from train.choose.evaluate import Result
-from train.tradeoff.choices import WINDOWS_S
+from train.tradeoff.choices import WINDOWS_S, unseen
 from train.tradeoff.early import Certified
 from train.tradeoff.measured import Measured
 
@@ -20,17 +20,17 @@ class Use:
 
     Attributes:
         name: of the way.
-        seconds: mean time to the decision.
+        seconds: mean time to the decision, from first contact.
         result: its accuracy.
+        unseen: its accuracy on unseen objects; None if no objects could be held out.
         commands: that make it.
-        window_s: of a decision after a fixed time.
     """
 
     name: str
     seconds: float
     result: Result
+    unseen: float | None
     commands: tuple[str, ...]
-    window_s: float | None = None
 
     def price(self, accuracy: float, measured: Measured) -> float:
         """The mean price of a decision at an accuracy."""
@@ -39,12 +39,13 @@ class Use:
 
 def fixed(measured: Measured, task: str, window_s: float) -> Use:
     """The decision of a task after a fixed window."""
+    choice = measured.points[window_s][task]
     return Use(
         f"after {window_s:g} s",
-        window_s + measured.after_s,
-        measured.results(task)[window_s],
-        (measured.commands.export(f"--window {window_s:g}"),),
         window_s,
+        choice.by_trial,
+        unseen(choice),
+        (measured.commands.export(f"--window {window_s:g}"),),
     )
 
 
@@ -52,8 +53,9 @@ def early(measured: Measured, rule: Certified) -> Use:
     """The early decision with an error rate."""
     return Use(
         f"early, at most {rule.error:.0%} wrong",
-        rule.mean_s + measured.after_s,
+        rule.mean_s,
         rule.result,
+        None if rule.unseen is None else float(rule.unseen.mean()),
         (measured.commands.export(*EARLY), measured.commands.run(rule.error)),
     )
 
@@ -61,7 +63,7 @@ def early(measured: Measured, rule: Certified) -> Use:
 def uses(measured: Measured, task: str) -> list[Use]:
     """Every fixed window and every early decision of a task, on the same contacts."""
     windows = [fixed(measured, task, window) for window in measured.results(task)]
-    rules = measured.comparisons[task].certified
+    rules = measured.certified[task]
     return [*windows, *(early(measured, rule) for rule in rules)]
 
 

@@ -6,7 +6,7 @@ import pytest
 
 from edge import demo
 from edge.model.model import Model
-from edge.tools.info import described, description, doubt
+from edge.tools.info import UNDOUBTED, described, description, doubt
 
 INFO = Model(demo.MODEL).info
 
@@ -37,6 +37,7 @@ def test_the_doubt_about_names_says_what_it_is_worth():
     unmeasured = replace(stopping.remoteness, worth={})
     (sentence,) = doubt({"object": replace(stopping, remoteness=unmeasured)})
     assert "an unseen object is not known: too few were in training" in sentence
+    assert [*doubt({})] == [UNDOUBTED]
 
 
 def test_a_person_gets_sentences(edge, monkeypatch):

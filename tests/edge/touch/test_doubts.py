@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from edge.touch.doubts import frame_doubts, is_several
+from edge.touch.doubts import frame_doubts
 from edge.touch.layout import SkinLayout
 from tests.edge.touch.pressed import followed, pressed
 
@@ -51,17 +51,3 @@ def test_frames_that_repeat_for_a_tenth_of_a_second_are_frozen(frames, flags):
         return growing(min(i, 50) if i <= 50 + frames else i)
 
     assert doubts(series(TIMES, frozen)) == flags
-
-
-def beside(share):
-    def taxels(i):
-        second = 61 * (i % 100 < 100 * share)
-        return {**growing(i), (3, 4): 100, (7, 7): second}
-
-    return taxels
-
-
-@pytest.mark.parametrize(("share", "several"), [(0.1, False), (0.3, True)])
-def test_a_second_region_in_a_fifth_of_the_window_counts(share, several):
-    felt = series(TIMES, beside(share))
-    assert is_several(felt.felt(WINDOW_S)) is several

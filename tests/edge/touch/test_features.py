@@ -26,7 +26,6 @@ def series(t, peak, area=None, motion=None, scale=None, ended=False):
         sums=np.zeros((n, 2), dtype=np.int64),
         motion=np.array(motion if motion is not None else [0.0] * n),
         same=np.zeros(n, dtype=np.bool_),
-        beside=np.zeros(n, dtype=np.bool_),
         layout=SkinLayout(1, 1, counts_per_newton=scale),
         ended=ended,
     )

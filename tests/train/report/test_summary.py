@@ -8,6 +8,7 @@ import pytest
 import train
 from edge.recording import load
 from edge.saving import save
+from edge.tools.info import UNDOUBTED
 from train.model.pipeline import ContactClassifier
 from train.report.summary import (
     LEAK,
@@ -35,6 +36,8 @@ def test_each_candidate_has_a_row_with_its_accuracies_and_prices(fitted):
     assert not lines[3]
     agree = "  halves of the folds choose the same features and projection in 20 of 20"
     assert f"{agree} divisions" in lines
+    assert fitted.sequential is None
+    assert UNDOUBTED in lines
 
 
 def test_flattering_data_and_left_out_recordings_get_a_warning(

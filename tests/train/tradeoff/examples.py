@@ -27,26 +27,25 @@ def chosen(right, unseen=None, of=100):
     return Chosen(Choice("IV", 1, 1), accuracy, result(right), left_out)
 
 
-def rule(error=0.1, right=95, mean_s=0.5):
-    """Early decisions of 100 contacts, so many of them right, half of them 0.1 s after
-    the mean."""
-    hits = np.arange(100) < right
-    seconds = mean_s + np.where(np.arange(100) % 2, 0.1, -0.1)
-    return Certified(error, hits, hits, 0.0, seconds)
+def rule(error=0.1, right=95, mean_s=0.5, unseen=None):
+    """Early decisions of 100 contacts, so many of them right, and so many of 100
+    contacts with unseen objects where these were left out."""
+
+    def hits(count):
+        return None if count is None else np.arange(100) < count
+
+    return Certified(error, mean_s, hits(right), hits(right), hits(unseen))
 
 
 def measured(points, certified, **changes):
-    """Measurements of {window: {task: choice}} with {task: certified rules}, on a
-    board that takes no time."""
+    """Measurements of {window: {task: choice}} with {task: certified rules}."""
     facts = {
         "y": dict.fromkeys(certified, np.array(["a"])),
         "points": points,
-        "comparisons": {
-            task: SimpleNamespace(certified=rules) for task, rules in certified.items()
-        },
+        "certified": certified,
         "costs": [],
         "board": SimpleNamespace(arithmetic_s=0.0, name="a board"),
-        "commands": Commands(("mine",), BUILD, BUILD / "board.json"),
+        "commands": Commands(("mine",), Path("a.npz"), BUILD, BUILD / "board.json"),
         "wire_s": 0.0,
     }
     return Measured(**{**facts, **changes})

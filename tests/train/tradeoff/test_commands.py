@@ -3,35 +3,41 @@ shell needs it."""
 
 from pathlib import Path
 
-from train.tradeoff.commands import Commands
+from train.tradeoff.commands import PROGRAM, Commands
 
 BUILD = Path("build/tradeoff")
 COST = "--cost wrong=10,second=1"
 
 
 def commands(*data, out=BUILD, **facts):
-    return Commands(data, out, out / "board.json", **facts)
+    return Commands(data, Path("a b.npz"), out, out / "board.json", **facts)
 
 
 def test_a_model_of_a_window():
     assert commands("my touches", "kept").export("--window 1") == (
-        "python -m export --data 'my touches' kept --out build --window 1"
+        f"{PROGRAM} export --data 'my touches' kept --out build --window 1"
     )
     elsewhere = commands("mine", out=Path("elsewhere"), quick=True)
     assert elsewhere.export("--window 1") == (
-        "python -m export --data mine --out elsewhere --quick --window 1"
+        f"{PROGRAM} export --data mine --out elsewhere --quick --window 1"
     )
 
 
 def test_a_point_of_the_front():
     assert commands("my touches", out=Path("a b")).front("0.9") == (
-        "python -m export --data 'my touches' --out 'a b' --front 0.9 "
+        f"{PROGRAM} export --data 'my touches' --out 'a b' --front 0.9 "
         "--fronts 'a b/front.json'"
+    )
+
+
+def test_an_early_decision_on_a_recording():
+    assert commands("mine").run(0.1) == (
+        f"{PROGRAM} run --model build/model.onnx --error 0.1 --fake 'a b.npz'"
     )
 
 
 def test_the_report_again_with_the_options_that_it_was_made_with():
     assert commands("mine", quick=True, task="object").tradeoff(COST) == (
-        "python -m train tradeoff --data mine --board build/tradeoff/board.json "
+        f"{PROGRAM} tradeoff --data mine --board build/tradeoff/board.json "
         f"--out build/tradeoff --quick --task object {COST}"
     )

@@ -37,12 +37,9 @@ from train.tradeoff.run import Options
 def test_the_front_has_the_windows_that_no_other_beats_in_both():
     shares = {0.2: 50, 0.4: 70, 0.6: 70, 0.8: 90, 1.0: 80}
     points = {w: {"t": chosen(share)} for w, share in shares.items()}
-    best = ParetoFront.of(points, "t", 0.01).points
-    assert [(p.window_s, p.milliseconds, p.accuracy) for p in best] == [
-        (0.2, 210.0, 0.5),
-        (0.4, 410.0, 0.7),
-        (0.8, 810.0, 0.9),
-    ]
+    best = ParetoFront.of(points, "t").points
+    accuracies = [(point.window_s, point.accuracy) for point in best]
+    assert accuracies == [(0.2, 0.5), (0.4, 0.7), (0.8, 0.9)]
     # As wide as that of two fifths of the trials.
     assert (best[0].low, best[0].high) == wilson(20, 40)
 
@@ -69,7 +66,7 @@ def fronted(recordings, tmp_path_factory):
     path = tmp_path_factory.mktemp("front") / "front.json"
     dataset = followed(read([recordings]))
     points = {0.4: make_choice(dataset, 0.4)}
-    front = ParetoFront.of(points, "category", 0.01, quick=True)
+    front = ParetoFront.of(points, "category", quick=True)
     path.write_text(json.dumps(front.to_dict(dataset.digest)))
     return path, points[0.4]["category"]
 
@@ -78,7 +75,7 @@ def test_export_writes_the_very_model_of_a_point(recordings, fronted, tmp_path, 
     path, choice = fronted
     export(tmp_path, "--data", recordings, "--front", "fast", "--fronts", path)
     message = capsys.readouterr().err
-    assert f"category {choice.by_trial.accuracy:.1%} (62 to 100) in 410 ms" in message
+    assert f"category {choice.by_trial.accuracy:.1%} (62 to 100)" in message
     info = Model(tmp_path / "model.onnx").info
     task = info.tasks["category"]
     assert info.window_s == 0.4
@@ -212,17 +209,22 @@ def test_the_cheapest_use_may_be_early_and_its_price_has_an_interval():
     assert "run --model build/model.onnx --error 0.1" in row["command"]
 
 
-class TestEarly:
-    def test_a_calibrated_confidence_has_no_calibration_error(self):
-        """Every confidence is a half."""
-        half = np.full((3, 100), 0.5)
-        for percent, error in ((50, 0.0), (90, 0.4)):
-            right = np.tile(np.arange(100) < percent, (3, 1))
-            course = Course([half], [~right], np.zeros_like(right))
-            seconds = (0.2, 0.6, 1.0)
-            compared = early.StoppingComparison(seconds, right, half, course, [])
-            assert compared.calibration_error == pytest.approx(error)
+def test_each_decision_has_its_accuracy_on_unseen_objects_and_the_time_of_the_touch():
+    """The board and the wire take time too, which no row counts."""
+    facts = measured(
+        {0.4: {"t": chosen(60, 45)}, 1.2: {"t": chosen(95)}},
+        {"t": [rule(unseen=57), rule(0.2)]},
+        board=SimpleNamespace(arithmetic_s=0.1, name="a board"),
+        wire_s=0.1,
+    )
+    *rows, _ = answer.answers(facts, "t")
+    shown = [(row["time s"], row["unseen objects %"]) for row in rows]
+    assert shown == [(0.4, 45.0), (1.2, ""), (0.5, 57.0), (0.5, "")]
+    notes = " ".join(answer.reasons(facts).text)
+    assert "On top come 100.0 ms on the wire and 100.00 ms of arithmetic" in notes
 
+
+class TestEarly:
     def test_early_decisions_follow_the_rules_that_the_model_of_all_contacts_certifies(
         self,
     ):
@@ -231,13 +233,15 @@ class TestEarly:
         wrong = np.array([[True, False, False, False], [False] * 4])
         unknown = np.array([[False] * 4, [True, False, False, False]])
         course = Course([np.full((2, 4), 0.5)], [wrong], unknown, withheld=unknown)
+        known = early.LeftOut(~wrong, course)
+        unseen = early.LeftOut(~wrong, replace(course, withheld=None))
         rules = StoppingRule(0.12, 1.2, NEVER, 1), StoppingRule(0.2, 0.6, 0.5, 1)
         stopping = Stopping((), (), (), 0.0, 0.0, 0.0, rules, 4, 0, 0.1)
-        late, soon = early._certified(course, stopping, (0.6, 1.2))
+        late, soon = early.at_errors(stopping, known, unseen)
         # The rates 0.05 and 0.1 are refused; one rule serves 0.2 to 0.3.
         assert (late.error, soon.error) == (0.15, 0.2)
         assert (late.mean_s, soon.mean_s) == (1.2, 0.6)
-        assert (late.unknown, soon.unknown) == (0.25, 0.0)
+        assert (late.unseen.sum(), soon.unseen.sum()) == (4, 3)
         # At the full window one more is right and one names nothing.
         assert soon.result.right == late.result.right == 3
         assert soon.gain[0] == 0.0
@@ -245,11 +249,8 @@ class TestEarly:
     @pytest.mark.slow
     def test_clear_contacts_are_decided_at_the_first_decision_point(self, tmp_path):
         dataset = followed(read([save_touches(tmp_path, 20)]))
-        compared = early.compare_stopping(dataset, (0.6, 1.2), certify=True)
-        compared = compared["category"]
-        assert compared.right.all()
         # Forty trials certify no rate as low as the smallest one.
-        (decisions,) = compared.certified
+        (decisions,) = early.certified(dataset, (0.6, 1.2))["category"]
         assert decisions.error > early.ERRORS[0]
         assert decisions.right.all()
         assert decisions.mean_s == pytest.approx(0.6)
@@ -263,7 +264,8 @@ class TestEarly:
         fixed = {"features": ("zone_kernels",), "projection": "lda", "scaling": "IV"}
         monkeypatch.setattr(early, "fit", partial(early.fit, **fixed))
         dataset = followed(read([save_touches(tmp_path, 20)]), ("zone_kernels",))
-        assert early.compare_stopping(dataset, (0.6, 1.2))["category"].right.all()
+        (decisions,) = early.certified(dataset, (0.6, 1.2))["category"]
+        assert decisions.right.all()
 
 
 class TestBoard:
