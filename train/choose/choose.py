@@ -3,6 +3,7 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import partial
+from itertools import chain, compress
 
 import numpy as np
 
@@ -83,16 +84,7 @@ class Choosing:
         """The choices by the candidates' answers to what is left out."""
         folds = self._divisions.folds
         further_folds = self._divisions.further
-        grids = [grid for candidate in self.candidates for grid in candidate.grids]
-        carried_over = [c for c in self.candidates if not c.known]
-        unseen = _side_by_side([grid for c in carried_over for grid in c.grids])
-        alone = [task for task in sorted(self._y) if task not in self._sharing]
-        sharing_in = dict.fromkeys(unseen, self._sharing)
-        by_trial = []
-        for grid in grids:
-            graded = self._is_few and nested
-            by_trial += for_tasks(grid, alone, graded=graded)
-            by_trial += for_tasks(grid, sharing_in.get(grid, ()))
+        by_trial, by_group = self._grids(graded=self._is_few and nested)
         total = fits(folds, nested)
         total += sum(fits(division, False) for division in further_folds)
         if self._groups is not None:
@@ -119,11 +111,27 @@ class Choosing:
             by_trials = Protocol(trials, self._rule)
             if self._groups is None:
                 return Protocols(by_trials)
-            by_group = [g for grid in unseen for g in for_tasks(grid, self._sharing)]
             groups = answers(self._groups.folds, by_group, nested=nested)
         shared = replace(by_trials, beside=groups, sharing=self._sharing)
         by_groups = replace(shared, table=groups, groups=self._groups, beside=trials)
         return Protocols(by_trials, by_groups, shared)
+
+    def _grids(self, graded: bool) -> tuple[list[SearchGrid], list[SearchGrid]]:
+        """The grids tried with trials left out, and those tried with groups left out,
+        for which the tasks that share their settings share a space.
+
+        Args:
+            graded: whether answers about tasks without groups are graded.
+        """
+        shared = _single_space([c for c in self.candidates if not c.known])
+        alone = sorted(self._y.keys() - {*self._sharing})
+        by_trial = []
+        for grid in chain.from_iterable(c.grids for c in self.candidates):
+            by_trial += for_tasks(grid, alone, graded=graded)
+            if grid in shared:
+                # Beside each other, as both decompose the same features.
+                by_trial += for_tasks(grid, self._sharing)
+        return by_trial, [g for grid in shared for g in for_tasks(grid, self._sharing)]
 
     def _right(self, window_s: float) -> dict[str, Floats]:
         """{task: the shares of right answers to each trial, of the candidate that is
@@ -217,12 +225,10 @@ class Choosing:
         """The settings of the decision points before the full window; None where no
         candidate has discriminants."""
         full = {task: settings.choice for task, settings in chosen.items()}
-        picks = [
-            pick
-            for settings in chosen.values()
-            for candidate, pick in zip(self.candidates, settings.picks, strict=True)
-            if pick is not None and not candidate.known
-        ]
+        is_tried = [not candidate.known for candidate in self.candidates]
+        picks: list[Choice] = []
+        for settings in chosen.values():
+            picks += filter(None, compress(settings.picks, is_tried))
         options = early_options(picks, full, self._widths)
         if not options:
             return None
@@ -272,11 +278,11 @@ class Choosing:
         )
 
 
-def _side_by_side(grids: Sequence[SearchGrid]) -> list[SearchGrid]:
-    """The grids of several tasks' discriminants side by side, a single space; all where
+def _single_space(candidates: Sequence[Candidate]) -> list[SearchGrid]:
+    """The candidates' grids of several tasks' discriminants side by side; all where
     there are none."""
-    together = [grid for grid in grids if grid.targets]
-    return together or list(grids)
+    grids = [*chain.from_iterable(candidate.grids for candidate in candidates)]
+    return [grid for grid in grids if grid.targets] or grids
 
 
 def _grouped_tasks(groups: Groups, y: Labels) -> tuple[str, ...]:

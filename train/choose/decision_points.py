@@ -116,11 +116,11 @@ def _bytes_of(choices: Choices, dataset: DataSet, samples: int) -> int:
     """Bytes of the constants that project and compare at a decision point.
 
     A column has a mean, a gain, and a weight for each coordinate; a trial its
-    coordinates and their length.
+    coordinates and their length. Tasks that share a space share these.
     """
     widths = dict(zip(dataset.names, dataset.widths(samples), strict=True))
     trials = len(dataset.trials)
-    size = 0
+    sizes: dict[object, int] = {}
     for task, choice in choices.items():
         columns = sum(widths[name] for name in choice.features)
         components = choice.components
@@ -128,8 +128,10 @@ def _bytes_of(choices: Choices, dataset: DataSet, samples: int) -> int:
             targets = choice.targets or (task,)
             components = sum(len(set(dataset.labels(t).tolist())) - 1 for t in targets)
         components = min(components, trials)
-        size += columns * (16 + 4 * components) + trials * (8 + 4 * components)
-    return size
+        size = columns * (16 + 4 * components) + trials * (8 + 4 * components)
+        space = choice.space(task)
+        sizes[space] = max(sizes.get(space, 0), size)
+    return sum(sizes.values())
 
 
 def _rising(step_s: float, window_s: float) -> list[float]:

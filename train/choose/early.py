@@ -34,7 +34,7 @@ MEANS = (1 / 3, 5 / 12, 1 / 2, 7 / 12, 2 / 3)
 """Mean times to decision, as parts of the full window, at which they are judged."""
 THRESHOLDS = 60
 FOLDS = 5
-SHRINKAGES = (0.1, 0.03, 0.01)
+SHRINKAGES = (0.3, 0.1, 0.03)
 MOST_COMPONENTS = 100
 
 

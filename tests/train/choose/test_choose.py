@@ -28,10 +28,10 @@ def two_tasks(choices):
     `t` and `u` by single trials; and with groups left out, where the second has eight
     more right about `t`, and the first two about `u`."""
     folds = np.arange(12) % 3
-    always = np.repeat([[True], [False]], 12, axis=1)
+    first = np.repeat([[True], [False]], 12, axis=1)
     t = np.stack([np.arange(12) < 0, np.arange(12) < 12])
     u = np.stack([np.arange(12) < 8, np.arange(12) < 6])
-    trials = {task: np.stack([always] * 3) for task in "tu"}
+    trials = {task: np.stack([first] * 3) for task in "tu"}
     groups = {"t": np.stack([t] * 2), "u": np.stack([u] * 2)}
     by_task = dict.fromkeys("tu", choices)
     return (
@@ -40,18 +40,22 @@ def two_tasks(choices):
     )
 
 
+def most_accurate(task, choices):
+    """The rule without prices."""
+    return Rule()
+
+
 def test_tasks_with_groups_share_the_best_mean_of_both_protocols():
     """By trials the first candidate gains 12 of 12 in both tasks, with groups left out it
     loses 12 of one and gains 2 of the other."""
     choices = [Choice("IV", 1, k, "lda") for k in (1, 3)]
     trials, unseen = two_tasks(choices)
     objects = Groups("object", trials.folds.astype(str), frozenset("tu"), unseen.folds)
-    always = lambda task, choices: Rule()  # noqa: E731
-    by_trials = Protocol(trials, always, beside=unseen, sharing="tu")
-    by_groups = Protocol(unseen, always, objects, trials, "tu")
-    for protocol, folds in ((by_trials, 3), (by_groups, 2)):
-        assert [protocol.choice(task).k for task in "tu"] == [1, 1]
-        assert [choice.k for choice in protocol.by_fold("t")] == [1] * folds
+    by_trials = Protocol(trials, most_accurate, beside=unseen, sharing="tu")
+    by_groups = Protocol(unseen, most_accurate, objects, trials, "tu")
+    for protocol in (by_trials, by_groups):
+        assert protocol.choice("t").k == protocol.choice("u").k == 1
+        assert {choice.k for choice in protocol.by_fold("t")} == {1}
     assert by_groups.name == "object"
     assert by_groups.accuracy("t").accuracy == 0.0
     assert by_groups.accuracy("u").accuracy == 8 / 12
@@ -67,7 +71,7 @@ def test_halves_of_the_folds_agree_where_one_candidate_is_right_in_all_of_them()
 
     def agreed(right):
         table = AnswerTable(folds, {"t": choices}, {"t": np.stack([right] * 4)})
-        return Protocol(table, lambda task, choices: Rule()).agreed("t")
+        return Protocol(table, most_accurate).agreed("t")
 
     assert agreed(best) == HALVINGS
     # They differ where a half has both folds in which one of the two is right.
