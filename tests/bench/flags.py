@@ -1,9 +1,10 @@
 """`make flags`: are answers with a flag more often wrong than those without it?
 
-A flag earns its place where they are. A row counts the answers of a domain that have
-the flag, and the shares of them, and of the answers without it, that are wrong. The
-latter are of the same tasks, and all are of tasks whose labels the model knows. A name
-that is withheld counts as that which the model would give. The domains:
+A flag earns its place where they are, and where those with no other flag are more often
+wrong than those without any. A row has the shares of the answers of a domain that are
+wrong. Those without the flag are of the same tasks, and all are of tasks whose labels
+the model knows. A name that is withheld counts as that which the model would give. The
+domains:
 
 - "fresh": fresh touches of `cody18`, decided by its full export.
 - "objects left out": the same by a full export without four of the 18 objects.
@@ -73,16 +74,21 @@ def flagged(domain, rows):
     """A row for each flag that answers of a domain have, from its `decisions`."""
     named = [decision and decision.label for decision in rows["decision"]]
     wrong = named != rows["truth"]
+    count = rows["flags"].map(len)
     for flag in FLAGS:
         has = rows["flags"].map(lambda flags, flag=flag: flag in flags)
         if has.any():
             alike = rows["task"].isin(rows["task"][has])
+            alone = has & (count == 1)
             yield {
                 "flag": flag,
                 "domain": domain,
                 "answers with it": has.sum(),
-                "wrong with it": f"{share(wrong[has]):.1%}",
+                "wrong": f"{share(wrong[has]):.1%}",
                 "wrong without it": f"{share(wrong[alike & ~has]):.1%}",
+                "answers with it alone": alone.sum(),
+                "of these wrong": f"{share(wrong[alone]):.1%}",
+                "wrong without any": f"{share(wrong[alike & (count == 0)]):.1%}",
             }
 
 
