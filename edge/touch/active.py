@@ -114,10 +114,3 @@ class ActiveTaxels:
         before = 0 if previous is None else previous.bits
         taxels, peak = largest_of(self._grid, self._padded, self.counts, before)
         return Region(self._grid, taxels, peak)
-
-    def has_other(self, region: Region, onset: int) -> bool:
-        """Whether a taxel beside a region is above the onset."""
-        beside = self.bits & ~region.bits
-        if not beside:
-            return False
-        return int(self.counts[self._grid.unpack(beside)].max()) > onset

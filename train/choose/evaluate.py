@@ -222,6 +222,10 @@ class AnswerTable:
         right = self.right[task][fold][:, self.folds != fold]
         return np.asarray(right * self._running(task)[fold])
 
+    def running_without(self, task: str, fold: int) -> Booleans:
+        """(candidates,) whether each runs in the choice without a fold."""
+        return np.asarray(self._running(task)[fold, :, 0])
+
     def is_running(self, task: str, candidate: int) -> bool:
         """Whether a candidate was not dropped, from the choice by all trials nor from
         every other."""

@@ -112,7 +112,8 @@ class Protocol:
         outside = self.folds != fold
         nested = [self.table.nested(task, fold) for task in self.sharing]
         others = [self.beside.plain(task)[:, outside] for task in self.sharing]
-        return _mean([*nested, *others])
+        running = self.table.running_without(task, fold)
+        return _mean([*nested, *others]) * running[:, None]
 
     def choice(self, task: str) -> Choice:
         """A task's settings."""

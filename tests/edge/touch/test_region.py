@@ -11,7 +11,6 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
 from edge.errors import InputError
-from edge.touch.active import ActiveTaxels
 from edge.touch.grid import best_cut
 from edge.touch.region import find_regions, largest_region
 
@@ -160,17 +159,6 @@ def test_bad_arguments_are_named(counts, keywords, word):
     for of in (largest_region, find_regions):
         with pytest.raises(InputError, match=word):
             of(counts, **{"threshold": 0, **keywords})
-
-
-def test_another_region_counts_from_above_the_onset():
-    counts = frame((2, 2), (2, 3), (9, 9), value=300)
-    active = ActiveTaxels(counts, 50)
-    contact = active.largest()
-    assert contact.area == 2
-    assert active.has_other(contact, 299)
-    assert not active.has_other(contact, 300)
-    alone = ActiveTaxels(frame((2, 2), (2, 3), value=300), 50)
-    assert not alone.has_other(alone.largest(), 0)
 
 
 def test_of_equally_good_cuts_of_the_circle_the_lowest_is_taken():
