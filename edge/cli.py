@@ -7,6 +7,7 @@ import gc
 import io
 import logging
 import os
+import shlex
 import sys
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
@@ -99,9 +100,21 @@ def dispatch(top: argparse.ArgumentParser, argv: Sequence[str] | None) -> int:
             import argcomplete
 
             argcomplete.autocomplete(top)
-    arguments = top.parse_args(argv)
+    words = list(sys.argv[1:] if argv is None else argv)
+    _refuse_empty(top, words)
+    arguments = top.parse_args(words)
+    arguments.command = shlex.join([top.prog, *words])
     with _messages(top.prog, getattr(arguments, "quiet", False)):
         return _status(top.prog, arguments)
+
+
+def _refuse_empty(top: argparse.ArgumentParser, words: Sequence[str]) -> None:
+    """Refuse an empty word, which a variable without a value leaves: as a path it would
+    be the current folder."""
+    for i, word in enumerate(words):
+        if not word or (word.startswith("-") and word.endswith("=")):
+            where = word or (f"after {words[i - 1]}" if i else "first")
+            top.error(f"an argument is empty ({where}); give it a value")
 
 
 @contextmanager

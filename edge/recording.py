@@ -1,12 +1,15 @@
 """A recording: the frames, joint angles and metadata of one trial, in one `.npz`
 file."""
 
+import io
 import logging
 import os
+import re
 import zipfile
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from contextlib import nullcontext
 from dataclasses import dataclass, field, replace
+from pathlib import Path
 from typing import Any, BinaryIO, Self
 
 import numpy as np
@@ -16,6 +19,7 @@ from edge.arrays import Array, Booleans, Counts, Floats
 from edge.config import parse_json, short_text
 from edge.errors import InputError, about
 from edge.files import open_regular, parsing
+from edge.labels import Table, plain, read_table
 from edge.touch.frame import Frame
 from edge.touch.layout import SkinLayout
 
@@ -27,6 +31,11 @@ FASTEST_HZ = 5000.0
 """Frame rates outside these limits are probably times in another unit."""
 LOG = logging.getLogger(__name__)
 KEYS = ("t", "frames", "joints", "valid", "shear", "meta")
+TEXT = re.compile(
+    rb"\x93NUMPY\x01\0..{'descr': '<U(\d+)', 'fortran_order': False, 'shape': \(\), } *\n",
+    re.DOTALL,
+)
+"""The head of a `.npy` file that holds a text."""
 
 
 @dataclass(frozen=True)
@@ -258,8 +267,6 @@ def read_labels(path: str, values: Any) -> dict[str, str]:
             "meta.labels and meta.contacts must map task names to labels, both text"
         )
     if not all(name.isprintable() and name == name.strip() for name in names):
-        from edge.labels import plain  # few labels need it
-
         return plain(labels, path)
     return labels
 
@@ -278,6 +285,7 @@ def load_arrays(
     path: str | os.PathLike[str],
     file: BinaryIO | None = None,
     keys: Sequence[str] | None = None,
+    known: Collection[str] | None = None,
 ) -> dict[str, Array]:
     """Arrays of an `.npz`, read without pickle.
 
@@ -288,10 +296,11 @@ def load_arrays(
         path: of the file, for errors.
         file: its contents, if they have been read already.
         keys: names of arrays; those that the file has are read. None reads all.
+        known: names that the file may have; any where None.
 
     Raises:
         InputError: the file is missing, damaged, larger than `LARGEST_BYTES`, or holds
-            something other than plain arrays.
+            something other than plain arrays, or one that is not known.
     """
     name = os.fspath(path)
     opened = open_regular(name, LARGEST_BYTES) if file is None else nullcontext(file)
@@ -300,20 +309,39 @@ def load_arrays(
         parsing(name, "a readable .npz file", "; copy or record it again"),
         zipfile.ZipFile(contents) as archive,
     ):
-        members = {}
+        members: dict[str, zipfile.ZipInfo] = {}
         for info in archive.infolist():
             key = info.filename.removesuffix(".npy")
-            if key != info.filename and (keys is None or key in keys):
+            if known and (key == info.filename or key in members or key not in known):
+                raise InputError(
+                    f"{name}: has a part {short_text(info.filename)}, which no recording "
+                    "has, or has twice; copy or record it again"
+                )
+            if key != info.filename:
                 members[key] = info
+        members = {key: members[key] for key in members if keys is None or key in keys}
         if sum(info.file_size for info in members.values()) > LARGEST_BYTES:
             raise InputError(
                 f"{name}: claims arrays of more than {LARGEST_BYTES} bytes; split it"
             )
         arrays = {}
         for key, info in members.items():
+            if key == "meta":
+                arrays[key] = _text(archive.read(info))
+                continue
             with archive.open(info) as stream:
                 arrays[key] = np.lib.format.read_array(stream, allow_pickle=False)
     return arrays
+
+
+def _text(contents: bytes) -> Array:
+    """The array in a `.npy` file, which usually is a text: numpy takes longer to read
+    such a header than all else of a recording's labels takes."""
+    head = TEXT.match(contents)
+    text = contents[head.end() :].decode("utf-32-le") if head else ""
+    if head is None or len(text) != int(head[1]):
+        return np.lib.format.read_array(io.BytesIO(contents), allow_pickle=False)
+    return np.array(text)
 
 
 def load_meta(name: str, arrays: dict[str, Array]) -> dict[str, Any]:
@@ -333,8 +361,24 @@ def load_meta(name: str, arrays: dict[str, Array]) -> dict[str, Any]:
     return meta
 
 
-def load(path: str | os.PathLike[str], file: BinaryIO | None = None) -> Recording:
-    """Read a recording.
+def read_meta(path: str | os.PathLike[str]) -> dict[str, Any]:
+    """The metadata of a recording alone, with the labels that it was recorded with.
+
+    Raises:
+        InputError: as `load`.
+    """
+    name = os.fspath(path)
+    meta = load_meta(name, load_arrays(name, keys=("meta",), known=KEYS))
+    with about(name):
+        return {**meta, "labels": read_labels(name, meta.get("labels", {}))}
+
+
+def load(
+    path: str | os.PathLike[str],
+    file: BinaryIO | None = None,
+    table_of: Callable[[Path], Table] = read_table,
+) -> Recording:
+    """Read a recording, with the labels that the table beside it says.
 
     >>> import edge
     >>> from edge import demo
@@ -347,13 +391,14 @@ def load(path: str | os.PathLike[str], file: BinaryIO | None = None) -> Recordin
     Args:
         path: of the `.npz`, which sentences name.
         file: its contents, where they have been read already.
+        table_of: gives a folder's table; `cache(read_table)` reads each once.
 
     Raises:
-        InputError: the file is missing, damaged, or not as the contract says; the
-            sentence names the file and the remedy.
+        InputError: the file or the table beside it is damaged, or not as the contract
+            says, or the file is missing; the sentence names it and the remedy.
     """
     name = os.fspath(path)
-    arrays = load_arrays(name, file, KEYS)
+    arrays = load_arrays(name, file, known=KEYS)
     for key in ("t", "frames"):
         if key not in arrays:
             raise InputError(
@@ -362,6 +407,10 @@ def load(path: str | os.PathLike[str], file: BinaryIO | None = None) -> Recordin
     fields: dict[str, Any] = {**arrays, "meta": load_meta(name, arrays)}
     recording = checked(name, Recording(**fields))
     warn_of_another_unit(name, recording.t)
+    folder, own_name = os.path.split(name)
+    table = table_of(Path(folder))
+    if own_name in table.rows:
+        recording.meta["labels"] = table.standing(own_name, recording.meta).labels
     return recording
 
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 import argparse
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +17,7 @@ from edge.classifier import Classifier, suited
 from edge.commands.options import add_engine, add_error, check_error
 from edge.commands.output import LOG, Output, counted
 from edge.errors import InputError, about, printable
+from edge.labels import read_table
 from edge.model.info import Task
 from edge.model.model import Model
 from edge.model.verify import first_series
@@ -119,9 +121,10 @@ def _replay(
 ) -> int:
     """Print a model's events of recordings; the number of files it could not use."""
     failed = 0
+    table_of = cache(read_table)
     for path in paths:
         try:
-            recording = load(path)
+            recording = load(path, table_of=table_of)
             events = decide(model, recording, str(path), error)
         except InputError as problem:
             failed += 1

@@ -1,20 +1,21 @@
 """What a person sees of a recorded touch: its curve, its decisions, and which touches
 ask for a look."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
+from edge.errors import InputError
 from edge.events import Decided
-from edge.labels import CATEGORY
+from edge.labels import CATEGORY, Labels
 from edge.recording import Recording
 
 UNKNOWN = "unknown"
 """The flag of a thing that was never met; in former recordings its label too."""
 UNSURE = 0.8
 """Confidence below which a decision is unsure."""
-KINDS = ("unsure", "wrong", "unlabelled")
+KINDS = ("unsure", "wrong", "unlabelled", "left_out")
 CURVE = 32
 """Points of a small curve."""
 
@@ -72,16 +73,17 @@ def is_unsure(confidence: float | None) -> bool:
     return confidence is None or confidence < UNSURE
 
 
-def kinds(meta: Mapping[str, Any]) -> list[str]:
+def kinds(meta: Mapping[str, Any], labels: Labels, left_out: bool = False) -> list[str]:
     """The kinds of touches that a recording belongs to.
 
     A touch is unsure if a decision about it was, or was unknown; it is wrong if its
     label is another than the decision; it is unlabelled if a task that was decided has
     no label, and none follows from others.
     """
-    labels = CATEGORY.completed(meta.get("labels", {}))
+    labels = CATEGORY.completed(labels)
     decided = decisions(meta)
     belongs = dict.fromkeys(KINDS, False)
+    belongs["left_out"] = left_out
     belongs["unlabelled"] = not labels or not labels.keys() >= decided.keys()
     for task, answer in decided.items():
         belongs["unsure"] |= is_unsure(answer["confidence"])
@@ -90,10 +92,9 @@ def kinds(meta: Mapping[str, Any]) -> list[str]:
     return [kind for kind in KINDS if belongs[kind]]
 
 
-def accepted(meta: Mapping[str, Any]) -> dict[str, str]:
+def accepted(meta: Mapping[str, Any], labels: Labels) -> dict[str, str]:
     """{task: label} that accepts the decisions of a kept touch, where they name a label
     and nobody has given one yet, nor others from which another follows."""
-    labels = meta.get("labels", {})
     all_labels = CATEGORY.completed(labels)
     out = {
         task: answer["label"]
@@ -105,7 +106,28 @@ def accepted(meta: Mapping[str, Any]) -> dict[str, str]:
     return out
 
 
-def selected(meta: Mapping[str, Any], words: Sequence[str]) -> bool:
-    """Whether a recording is of every kind, or has every task, that some words name."""
-    names = {*kinds(meta), *meta.get("labels", {}), *decisions(meta)}
-    return names.issuperset(words)
+def words(decided: Collection[str], labels: Labels, kinds: Sequence[str]) -> set[str]:
+    """What selects a recording: its kinds, the tasks that it has or that were decided,
+    and its labels, as `object=cup`."""
+    return {*kinds, *labels, *decided, *map("=".join, labels.items())}
+
+
+def require_words(
+    selecting: Sequence[str], touches: Sequence[tuple[Mapping[str, Any], Labels]]
+) -> None:
+    """Refuse words that name no kind, no task of some touches, and no label of one.
+
+    Raises:
+        InputError: the sentence lists what there is.
+    """
+    if selecting:
+        tasks = {
+            task for meta, labels in touches for task in (*labels, *decisions(meta))
+        }
+        names = {*KINDS, *tasks}
+        for word in selecting:
+            if word not in names and word.partition("=")[0] not in tasks:
+                raise InputError(
+                    f"--only takes {', '.join([*KINDS, *sorted(tasks)])}, or TASK=LABEL, "
+                    f"not {word!r}"
+                )

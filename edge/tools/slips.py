@@ -2,7 +2,7 @@
 
 import re
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from difflib import SequenceMatcher
 
 from edge.labels import CATEGORY
@@ -19,26 +19,46 @@ SPACES = re.compile(r"[\s_-]+")
 MOST_NAMES = 500
 MOST = 8
 """Sentences of a kind."""
+MOST_PLACES = 3
+"""Recordings that a sentence names."""
 
 Labels = Sequence[Mapping[str, str]]
 """{task: label} of each recording."""
 
 
-def slips(labels: Labels) -> list[str]:
-    """A sentence for each kind of label that is probably a slip.
+def slips(labels: Labels, places: Sequence[str]) -> list[str]:
+    """A sentence for each kind of label that is probably a slip, with some of the places
+    (n,) of the recordings.
 
-    >>> slips([{"object": "box"}] * 8 + [{"object": "Box"}])
-    ["object='Box' on 1 of 9 recordings; is it 'box'?"]
+    >>> slips([{"object": "box"}] * 8 + [{"object": "Box"}], list("abcdefghi"))
+    ["object='Box' on 1 of 9 recordings (i); is it 'box'?"]
     """
-    tasks = Counter(task for trial in labels for task in trial)
-    sentences = _rare("task ", tasks, len(labels))
-    for sentence, count in Counter(map(CATEGORY.contradiction, labels)).items():
+    trials = list(zip(labels, places, strict=True))
+    of_tasks = _by((task, place) for trial, place in trials for task in trial)
+    sentences = _rare("task ", of_tasks, len(labels))
+    odd = _by((CATEGORY.contradiction(trial), place) for trial, place in trials)
+    for sentence, where in odd.items():
         if sentence:
-            sentences.append(f"{sentence}, on {count} of {len(labels)} recordings")
-    for task in sorted(tasks):
-        counts = _label_counts(task, labels)
-        sentences += _rare(f"{task}=", counts, counts.total())
+            sentences.append(f"{sentence}, on {_some(where, len(labels))}")
+    for task in sorted(of_tasks):
+        given = _by((trial[task], place) for trial, place in trials if task in trial)
+        sentences += _rare(f"{task}=", given, len(of_tasks[task]))
     return sentences
+
+
+def _by(pairs: Iterable[tuple[str, str]]) -> dict[str, list[str]]:
+    """{name: its places}."""
+    places: dict[str, list[str]] = {}
+    for name, place in pairs:
+        places.setdefault(name, []).append(place)
+    return places
+
+
+def _some(places: Sequence[str], total: int) -> str:
+    """How many recordings of all, and the places of some."""
+    more = f" and {len(places) - MOST_PLACES} more" if places[MOST_PLACES:] else ""
+    named = "; ".join(places[:MOST_PLACES])
+    return f"{len(places)} of {total} recordings ({named}{more})"
 
 
 def doubts(labels: Labels) -> list[list[str]]:
@@ -59,6 +79,20 @@ def doubts(labels: Labels) -> list[list[str]]:
     return sentences
 
 
+def too_few(labels: Labels) -> list[str]:
+    """A sentence where the recordings are of two things, so that none can be unknown.
+
+    >>> too_few([{"object": "box"}, {"object": "cup"}])
+    ['record a third object, and the model can tell what it does not know']
+    """
+    kinds = {CATEGORY.task, *CATEGORY.factors}
+    names = [set(trial.items()) for trial in labels]
+    things = Counter(task for task, _ in set().union(*names) if task not in kinds)
+    if things and max(things.values()) == 2:
+        return ["record a third object, and the model can tell what it does not know"]
+    return []
+
+
 def counts_text(labels: Labels) -> list[str]:
     """A line for each task: how many recordings have each label."""
     lines = []
@@ -76,24 +110,22 @@ def _label_counts(task: str, labels: Labels) -> Counter[str]:
     return Counter(trial[task] for trial in labels if task in trial)
 
 
-def _rare(thing: str, counts: Mapping[str, int], total: int) -> list[str]:
+def _rare(thing: str, places: Mapping[str, Sequence[str]], total: int) -> list[str]:
     """Sentences on the names that are probably slips.
 
     Args:
         thing: stands before each name.
-        counts: of the recordings with each name.
+        places: of the recordings with each name.
         total: recordings that could have one.
     """
     sentences = []
-    likely = _likely(counts)
-    for name, count in sorted(counts.items()):
+    likely = _likely({name: len(where) for name, where in places.items()})
+    for name, where in sorted(places.items()):
         if name in likely:
-            sentences.append(
-                f"{thing}{name!r} on {count} of {total} recordings; is it "
-                f"{likely[name]!r}?"
-            )
-        elif count == 1 and len(counts) < total:
-            sentences.append(f"{thing}{name!r} on a single recording")
+            question = f"; is it {likely[name]!r}?"
+            sentences.append(f"{thing}{name!r} on {_some(where, total)}{question}")
+        elif len(where) == 1 and len(places) < total:
+            sentences.append(f"{thing}{name!r} on a single recording ({where[0]})")
     return sentences[:MOST]
 
 

@@ -14,6 +14,8 @@ from numpy.typing import NDArray
 from edge.config import short_text
 from edge.errors import InputError, about
 from edge.files import parsing
+from edge.labels import TABLE as LABELS
+from edge.labels import read_table
 from train.importers import Refused, arrays
 from train.importers.columns import columns, named_times
 from train.importers.options import TableOptions
@@ -21,14 +23,12 @@ from train.importers.reading import (
     TEXTS,
     inner,
     read_frame,
-    read_labels,
     read_parquet,
     read_text,
     suffix_of,
 )
 from train.importers.tables import Table, numbered, require_filled, require_unique
 
-LABELS = "labels.csv"
 SKIN = "skin.json"
 SUFFIXES = (*TEXTS, ".parquet", *arrays.SUFFIXES)
 NUMBERED = re.compile(r"(?:trial|rec|recording|run|take|sample|test)?[\s_.-]*\d+", re.I)
@@ -120,34 +120,32 @@ def _labelled(
         InputError: it names none of the trials.
     """
     trials = [source.name for source in sources if isinstance(source, Source)]
-    rows = _label_rows(path, trials)
+    table = read_table(path.parent, "trial")
     files = {_name(file, path.parent) for file in _visible(path.parent)}
-    for row in sorted(rows.keys() - {*trials, *files}):
-        yield Refused(f"{path}: {row} names no file")
+    names = {
+        row: row if row in trials else _name(path.parent / row, path.parent)
+        for row in table.rows
+    }
+    if not set(names.values()) & set(trials):
+        raise InputError(
+            f"{path}: needs a column file with names such as {short_text(trials)}"
+        )
+    for row in sorted(names):
+        if names[row] not in {*trials, *files}:
+            yield Refused(f"{path}, line {table.rows[row].line}: {row} names no file")
+    rows = {name: row for row, name in names.items()}
     for source in sources:
         if isinstance(source, Refused):
             yield source
             continue
         if source.name not in rows:
             yield Refused(f"{path}: has no row for {source.name}, which has no label")
-        labels = {**source.labels, task: "", **rows.get(source.name, {})}
-        labels = {key: label for key, label in labels.items() if label}
-        yield replace(source, labels=labels, label=LABELS)
-
-
-def _label_rows(path: Path, trials: list[str]) -> dict[str, dict[str, str]]:
-    """{trial: {task: label}} of a labels.csv."""
-    data = read_labels(path)
-    if "trial" not in data or not data["trial"].isin(trials).any():
-        raise InputError(
-            f"{path}: needs a column trial with names such as {short_text(trials)}"
-        )
-    require_filled(path, data, "trial")
-    repeated = data["trial"][data["trial"].duplicated()]
-    if len(repeated):
-        raise InputError(f"{path}: {repeated.iloc[0]} has two rows; remove one of them")
-    rows = data.set_index("trial").iterrows()
-    return {str(trial): row.dropna().to_dict() for trial, row in rows}
+        labels = {**source.labels, task: ""}
+        row = rows.get(source.name, "")
+        labels, left_out = table.standing(row, {"labels": labels})
+        if not left_out:
+            labels = {key: label for key, label in labels.items() if label}
+            yield replace(source, labels=labels, label=LABELS)
 
 
 def _sources(

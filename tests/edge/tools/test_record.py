@@ -315,7 +315,7 @@ def test_a_trial_keeps_what_a_model_said_of_its_touch(edge, tmp_path):
     assert trial.labels == {"object": "cushion"}
     assert trial.meta["decided"]["object"]["label"] == "pillow"
     assert "arm" in trial.meta
-    assert "wrong" in review.kinds(trial.meta)
+    assert "wrong" in review.kinds(trial.meta, trial.labels)
 
 
 def test_a_model_brings_the_arm_that_it_needs(refused, tmp_path):
