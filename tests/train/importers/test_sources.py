@@ -96,7 +96,7 @@ def test_labels_of_no_file_and_files_without_labels_are_named(folder, capsys):
 
 def test_a_row_may_name_the_file_and_leave_it_out(folder):
     labels = "file;object;left_out\nr0.csv;box;\nb/r1.csv;cup;\nr2.csv;cup;yes\n"
-    files = {name: TRIAL for name in ("r0.csv", "b/r1.csv", "r2.csv")}
+    files = dict.fromkeys(("r0.csv", "b/r1.csv", "r2.csv"), TRIAL)
     put(folder, files | {"labels.csv": labels})
     status, recordings = imported(folder)
     assert status == 0
