@@ -102,7 +102,8 @@ def dispatch(top: argparse.ArgumentParser, argv: Sequence[str] | None) -> int:
             argcomplete.autocomplete(top)
     words = list(sys.argv[1:] if argv is None else argv)
     _refuse_empty(top, words)
-    arguments = top.parse_args(words)
+    arguments, bare = top.parse_known_args(words)
+    _place(top, arguments, bare)
     arguments.command = shlex.join([top.prog, *words])
     with _messages(top.prog, getattr(arguments, "quiet", False)):
         return _status(top.prog, arguments)
@@ -115,6 +116,22 @@ def _refuse_empty(top: argparse.ArgumentParser, words: Sequence[str]) -> None:
         if not word or (word.startswith("-") and word.endswith("=")):
             where = word or (f"after {words[i - 1]}" if i else "first")
             top.error(f"an argument is empty ({where}); give it a value")
+
+
+def _place(
+    top: argparse.ArgumentParser, arguments: argparse.Namespace, words: Sequence[str]
+) -> None:
+    """Take words that stand without an option as the model or the skin, by their suffix,
+    and refuse other ones, or none where the command needs one."""
+    for word in words:
+        names = ["skin", "model"] if word.endswith(".toml") else ["model", "skin"]
+        free = [name for name in names if getattr(arguments, name, "") is None]
+        if word.startswith("-") or not free:
+            top.error(f"unrecognized arguments: {word}")
+        setattr(arguments, free[0], word)
+    needed = getattr(arguments, "needs", None)
+    if needed and getattr(arguments, needed) is None:
+        top.error(f"a {needed} is required: name its file, with --{needed} or without")
 
 
 @contextmanager

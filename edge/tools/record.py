@@ -24,7 +24,7 @@ import numpy as np
 
 from edge.arrays import Array, Floats
 from edge.classifier import AsideEvents, Classifier
-from edge.commands.options import add_reading, within
+from edge.commands.options import add_file, add_reading, within
 from edge.commands.output import LOG
 from edge.commands.source import Opened, reading
 from edge.errors import InputError
@@ -77,11 +77,8 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         metavar="FOLDER",
         help="a folder for numbered trials (default: %(default)s)",
     )
-    parser.add_argument(
-        "--model",
-        help="model.onnx, whose decisions are shown beside the labels and kept in each "
-        "trial",
-    )
+    text = "a model, whose decisions are shown beside the labels and kept in each trial"
+    add_file(parser, "model", text)
     parser.add_argument(
         "--trials",
         type=within(int, 1, 1e9),

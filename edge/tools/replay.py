@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from edge.classifier import Classifier, suited
-from edge.commands.options import add_engine, add_error, check_error
+from edge.commands.options import add_engine, add_error, apart, check_error
 from edge.commands.output import LOG, Output, counted
 from edge.errors import InputError, about, printable
 from edge.labels import read_table
@@ -34,9 +34,11 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     """Add the command's options."""
     parser.add_argument(
         "--model",
-        required=True,
         action="append",
-        help="model.onnx; repeat it to compare several on the same recordings",
+        default=[],
+        metavar="model.onnx",
+        help="the model; may stand without --model; repeat it to compare several on the "
+        "same recordings",
     )
     parser.add_argument(
         "--summary",
@@ -49,7 +51,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         "recordings",
         nargs="+",
         metavar="REC",
-        help=".npz files or folders",
+        help=".npz files or folders, and models",
     )
 
 
@@ -93,9 +95,12 @@ def decide(
 
 def run(arguments: argparse.Namespace) -> int:
     """Print the events; 2 if a file could not be used."""
-    models = [Model(path, arguments.engine) for path in arguments.model]
+    files, recordings = apart(arguments.recordings, *arguments.model)
+    models = [Model(path, arguments.engine) for path in files]
+    if not models or not recordings:
+        raise InputError("give a model.onnx, and recordings to replay")
     output = Output.of(arguments)
-    paths = find(arguments.recordings)
+    paths = find(recordings)
     summaries = []
     failed = 0
     for model in models:

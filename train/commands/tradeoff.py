@@ -1,7 +1,7 @@
 """Show the price of accuracy in time: waiting, the wire, arithmetic.
 
 Writes OUT/report.html (nothing outside it is linked), each plot as PNG, each table as
-CSV, and front.json, which `python -m export --front` reads.
+CSV, and front.json, which `edge-classify export --front` reads.
 """
 
 import argparse

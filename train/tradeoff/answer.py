@@ -297,7 +297,7 @@ def _split(figure: Any, measured: Measured) -> None:
         axes.set_yticks([])
         axes.grid(visible=False)
         axes.spines["left"].set_visible(False)
-        axes.locator_params("x", nbins=7)
+        axes.locator_params("x", nbins=5)
     start = 1e3 * window - 0.25 * after_ms
     end = 1e3 * window + 1.02 * after_ms
     whole.set_xlim(0.0, 1e3 * window + after_ms)
