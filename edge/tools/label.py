@@ -2,14 +2,13 @@
 
 Prints each recording's labels and decisions, how many recordings have each label, and
 which are probably slips. With --set, --unset, --accept, --leave-out or --put-back, shows
-what would change, and with --yes, or once you agree, writes it into labels.csv beside the
-recordings, which wins over their own labels. Recordings stay as they are. --undo takes
-the last change back, ten times. The next `make export` trains on the new labels.
+what would change, and with --yes writes it into labels.csv beside the recordings, which
+wins over their own labels. Recordings stay as they are. --undo takes the last change
+back, ten times. The next `make export` trains on the new labels.
 """
 
 import argparse
 import os
-import sys
 from collections.abc import Mapping, Sequence
 from functools import cache
 from pathlib import Path
@@ -150,7 +149,7 @@ def _change(
     """Show what becomes of recordings, and change their labels.
 
     Raises:
-        InputError: nobody agrees, or a recording has been changed meanwhile.
+        InputError: --yes is missing, or a recording has been changed meanwhile.
     """
     by_folder: dict[Path, dict[str, Change]] = {}
     for path, meta, before, place, _ in touches:
@@ -171,7 +170,7 @@ def _change(
         output.text(f"none of {counted(len(touches), 'recording')} would change")
         return 0
     number = counted(sum(map(len, by_folder.values())), "recording")
-    if not arguments.yes and not _agreed(output, number):
+    if not arguments.yes:
         raise InputError(f"{number} would change, as shown; add --yes to do it")
     when = now()
     for folder, changes in by_folder.items():
@@ -179,13 +178,6 @@ def _change(
     names = [str(folder / file) for folder in by_folder for file in by_folder[folder]]
     _print(output, read(names))
     return 0
-
-
-def _agreed(output: Output, number: str) -> bool:
-    """Ask the person at the terminal, if there is one."""
-    if output.as_json or not sys.stdin.isatty():
-        return False
-    return input(f"Change {number}? [y/N] ").strip().lower() in ("y", "yes")
 
 
 def _undo(data: Sequence[str], output: Output) -> int:

@@ -1,13 +1,10 @@
 """Labels of recordings, listed and changed."""
 
-import io
-import sys
 from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
-from edge.commands.output import Output
 from edge.labels import TABLE
 from edge.recording import load
 from edge.saving import find, save
@@ -202,15 +199,6 @@ def test_the_last_change_is_taken_back_in_all_of_its_folders(kept, edge, make_to
     edge("label", kept, "--undo")
     assert load(kept / "wrong.npz").labels == {"softness": "soft"}
     assert edge("label", kept, "--undo")[0] == 2
-
-
-def test_a_person_at_a_terminal_is_asked(kept, edge, monkeypatch):
-    monkeypatch.setattr("edge.tools.label.Output.of", lambda _: Output(as_json=False))
-    for answer, labels in {"n\n": {"softness": "soft"}, "y\n": {}}.items():
-        monkeypatch.setattr(sys, "stdin", io.StringIO(answer))
-        monkeypatch.setattr(sys.stdin, "isatty", lambda: True)
-        edge("label", kept / "wrong.npz", "--unset", "softness", text=True)
-        assert load(kept / "wrong.npz").labels == labels
 
 
 def test_what_reads_leaves_a_folder_of_a_former_release_as_it_is_and_names_it(
