@@ -9,10 +9,9 @@ back, ten times. The next `make export` trains on the new labels.
 
 import argparse
 import os
-from collections.abc import Mapping, Sequence
-from functools import cache
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 from edge.commands.output import LOG, Output, counted
 from edge.commands.texts import labels_text
@@ -22,26 +21,12 @@ from edge.recording import read_meta
 from edge.saving import listed, remarks
 from edge.tools import review
 from edge.tools.changes import FORMER, Change, Former, change, formers, now, undo
+from edge.tools.review import Touch
 from edge.tools.slips import counts_text, slips
 from edge.tools.trial_options import task_label
 
 CHANGES = ("set", "unset", "accept", "leave_out", "put_back", "rows")
 """Options that change something."""
-
-
-class Touch(NamedTuple):
-    """A recording, its metadata, how it stands, and what tells its labels."""
-
-    path: Path
-    meta: dict[str, Any]
-    standing: Standing
-    place: str
-    kinds: list[str]
-
-    @property
-    def labels(self) -> dict[str, str]:
-        """{task: label}."""
-        return self.standing.labels
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
@@ -102,14 +87,11 @@ def run(arguments: argparse.Namespace) -> int:
         raise InputError("--set and --unset name a task twice; name it once")
     if arguments.leave_out and arguments.put_back:
         raise InputError("--leave-out and --put-back contradict each other; give one")
-    touches = read(arguments.data)
-    review.require_words(arguments.only, [(it.meta, it.labels) for it in touches])
-    selected = [
-        it
-        for it in touches
-        if review.words(review.decisions(it.meta), it.labels, it.kinds)
-        >= {*arguments.only}
-    ]
+    touches = read(listed(arguments.data))
+    for folder in dict.fromkeys(touch.path.parent for touch in touches):
+        for sentence in remarks(read_table(folder)):
+            LOG.warning(sentence)
+    selected = review.selected(touches, arguments.only)
     if not selected:
         output.text(f"none of {counted(len(touches), 'recording')} is of this kind")
         return 1
@@ -119,26 +101,9 @@ def run(arguments: argparse.Namespace) -> int:
     return 0
 
 
-def read(data: Sequence[str]) -> list[Touch]:
-    """The recordings named, and how they stand.
-
-    Raises:
-        InputError: a recording or a table cannot be read.
-    """
-    table_of = cache(read_table)
-    touches = []
-    for path in listed(data):
-        meta = read_meta(path)
-        table = table_of(path.parent)
-        standing = table.standing(path.name, meta)
-        row = table.rows.get(path.name)
-        place = f"{path}, line {row.line} of {table.path.name}" if row else str(path)
-        kinds = review.kinds(meta, *standing)
-        touches.append(Touch(path, meta, standing, place, kinds))
-    for folder in dict.fromkeys(touch.path.parent for touch in touches):
-        for sentence in remarks(table_of(folder)):
-            LOG.warning(sentence)
-    return touches
+def read(paths: Iterable[Path]) -> list[Touch]:
+    """The recordings of some files."""
+    return review.touches({path: read_meta(path) for path in paths})
 
 
 def _change(
@@ -152,7 +117,7 @@ def _change(
         InputError: --yes is missing, or a recording has been changed meanwhile.
     """
     by_folder: dict[Path, dict[str, Change]] = {}
-    for path, meta, before, place, _ in touches:
+    for path, meta, before, place in touches:
         labels = changed(
             meta,
             before.labels,
@@ -175,8 +140,10 @@ def _change(
     when = now()
     for folder, changes in by_folder.items():
         change(folder, changes, when, arguments.command)
-    names = [str(folder / file) for folder in by_folder for file in by_folder[folder]]
-    _print(output, read(names))
+    _print(
+        output,
+        read(folder / file for folder in by_folder for file in by_folder[folder]),
+    )
     return 0
 
 
@@ -224,13 +191,14 @@ def _decided_text(decided: Mapping[str, Mapping[str, Any]]) -> str:
 def _print(output: Output, touches: Sequence[Touch]) -> None:
     """Print each recording's labels, how many have each label, and probable slips."""
     width = max(len(str(touch.path)) for touch in touches)
-    for path, meta, standing, _, kinds in touches:
+    for touch in touches:
+        path, meta, standing, _ = touch
         decided = review.decisions(meta)
         event: dict[str, Any] = {
             "event": "labels",
             "file": str(path),
             "labels": standing.labels,
-            "kinds": kinds,
+            "kinds": touch.kinds,
         }
         text = f"{path!s:<{width}}  {_text(standing)}"
         if decided:
@@ -238,7 +206,7 @@ def _print(output: Output, touches: Sequence[Touch]) -> None:
             text += f" (decided: {_decided_text(decided)})"
         output.event(event, text)
     in_use = [touch for touch in touches if not touch.standing.left_out]
-    labels = [touch.labels for touch in in_use]
+    labels = [touch.standing.labels for touch in in_use]
     for sentence in counts_text(labels):
         output.text(sentence)
     for sentence in slips(labels, [touch.place for touch in in_use]):

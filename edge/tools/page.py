@@ -8,7 +8,7 @@ import tempfile
 from collections import Counter, deque
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
@@ -17,12 +17,13 @@ import numpy as np
 from edge.errors import InputError
 from edge.events import Decided, Event, Onset
 from edge.files import parsing
-from edge.labels import Standing, Table, read_table
-from edge.recording import Recording, load, read_meta
+from edge.labels import Standing
+from edge.recording import load, read_meta
 from edge.skin.loop import Schedule
 from edge.tools import review
 from edge.tools.changes import Change, change, formers, now, undo
 from edge.tools.label import changed
+from edge.tools.review import Touch
 from edge.tools.slips import doubts, too_few
 from edge.tools.web import WebServer
 from edge.touch.contact import Contact
@@ -41,29 +42,6 @@ LAST_NOTICES = 8
 CURVE_S = 5.0
 """Of a contact, the page draws so many seconds from its onset."""
 LONGEST_LABEL = 80
-
-
-@dataclass
-class Touch:
-    """A recording of the page's folder.
-
-    Attributes:
-        meta: what it was recorded with: labels, decisions, and labels of contacts.
-        made_ns: when it was written.
-        course: its seconds and its curve, once they have been read.
-    """
-
-    meta: Json
-    made_ns: int
-    course: Json = field(default_factory=dict)
-
-    @classmethod
-    def of(cls, path: Path, meta: Mapping[str, Any]) -> "Touch":
-        """That of a file with this metadata."""
-        used = {
-            key: meta[key] for key in ("labels", "decided", "contacts") if key in meta
-        }
-        return cls(used, path.stat().st_mtime_ns)
 
 
 class Page:
@@ -108,14 +86,12 @@ class Page:
         self._waits = {task for task in labels or {} if task not in self.labels}
         self.recording = bool(self.labels) and not self._waits
         self._touches: dict[str, Touch] = {}
-        self._table = Table(Path())
-        self._rows: list[Json] = []
-        """What the list says of each touch, the newest first."""
-        self._undo: Json | None = None
-        """The last change of the folder's labels."""
+        """Those of the folder by file, the newest first."""
+        self._courses: dict[str, Json] = {}
+        """The seconds and the curve of touches that have been shown."""
         self._notices: deque[str] = deque(maxlen=LAST_NOTICES)
         self._version = 0
-        """Number of changes of the list, and of the labels."""
+        """Number of changes of the list or of the labels that this program has made."""
         self.look()
         self._tracker = ContactTracker(layout, horizon_s=CURVE_S)
         self._contact: Contact | None = None
@@ -167,7 +143,6 @@ class Page:
             "waits": sorted(self._waits),
             "trials": self._version,
             "notices": list(self._notices),
-            "undo": self._undo,
         }
         if frame.shear is not None:
             picture["shear"] = frame.shear.reshape(-1, 2).tolist()
@@ -180,15 +155,16 @@ class Page:
         """Show a sentence, such as the state of a chip."""
         self._notices.append(text)
 
-    def saved(self, path: Path, trial: Recording) -> None:
-        """Add a trial that has been recorded."""
-        self._touches[path.name] = Touch.of(path, trial.meta)
-        self._arrange()
+    def saved(self) -> None:
+        """Show that a touch has been recorded."""
+        self._version += 1
 
     def left_out(self, paths: Sequence[Path]) -> int:
         """How many of these recordings are left out."""
-        rows = [self._table.rows.get(path.name) for path in paths]
-        return sum(row is not None and row.left_out for row in rows)
+        touches = self._touches
+        return sum(
+            it.name in touches and touches[it.name].standing.left_out for it in paths
+        )
 
     def _curves(self) -> Json | None:
         """The last contact: its taxels, and its features since onset."""
@@ -211,65 +187,27 @@ class Page:
 
     def look(self) -> None:
         """Take in the touches that have come into the folder, those that have gone, and
-        the labels that have changed."""
+        the labels that have changed; what cannot be read is named once."""
         if self._folder is None:
             return
-        paths = {path.name: path for path in self._folder.glob("[!.]*.npz")}
-        gone = self._touches.keys() - paths
-        for name in gone:
-            del self._touches[name]
-        come = paths.keys() - self._touches
-        for name in sorted(come):
+        known = {touch.path: touch.meta for touch in self._touches.values()}
+        metas = {}
+        for path in sorted(self._folder.glob("[!.]*.npz")):
             with self._naming("; the list skips it"):
-                self._touches[name] = Touch.of(paths[name], read_meta(paths[name]))
-        table = self._table
-        with self._naming(""):
-            table = read_table(self._folder)
-        if table != self._table or gone or come & self._touches.keys():
-            self._table = table
-            self._arrange()
+                metas[path] = known.get(path) or read_meta(path)
+        with self._naming():
+            touches = review.touches(metas)
+            touches.sort(key=lambda touch: touch.path.stat().st_mtime_ns)
+            self._touches = {touch.path.name: touch for touch in reversed(touches)}
 
     @contextmanager
-    def _naming(self, then: str) -> Iterator[None]:
+    def _naming(self, then: str = "") -> Iterator[None]:
         """Say once what cannot be read."""
         try:
             yield
         except (InputError, OSError) as error:
-            sentence = f"{error}{then}"
-            if sentence not in self._notices:
-                self.notice(sentence)
-
-    def _arrange(self) -> None:
-        """Make the list anew."""
-        rows = []
-        # Another thread adds to the touches.
-        touches = sorted(
-            self._touches.items(), key=lambda item: (item[1].made_ns, item[0])
-        )
-        for file, touch in reversed(touches):
-            meta = touch.meta
-            standing = Standing(meta.get("labels", {}))
-            with self._naming(""):
-                standing = self._table.standing(file, meta)
-            rows.append(
-                {
-                    "file": file,
-                    **standing._asdict(),
-                    "decided": review.decisions(meta),
-                    "accepted": review.accepted(meta, standing.labels),
-                    "kinds": review.kinds(meta, *standing),
-                }
-            )
-        for row, sentences in zip(
-            rows, doubts([it["labels"] for it in rows]), strict=True
-        ):
-            row["doubts"] = sentences
-        self._rows = rows
-        self._undo = None
-        with self._naming(""):
-            for former in formers(self._folder or Path())[-1:]:
-                self._undo = {"time": former.time, "command": former.command}
-        self._version += 1
+            if f"{error}{then}" not in self._notices:
+                self.notice(f"{error}{then}")
 
     def _act(self, action: Json) -> Json | None:
         """Carry out an action of the page; the list of touches where it asks for it, with
@@ -283,7 +221,9 @@ class Page:
             raise InputError("this page records nothing; start it with `record --web`")
         if kind == "trials":
             self.look()
-            return self._list(self._folder, action)
+            return self._list(
+                self._folder, str(action.get("only", "")), action.get("start")
+            )
         if kind == "labels":
             self.labels = {**self.labels, **_labels(action)}
             if self._waits and self._waits <= self.labels.keys():
@@ -305,42 +245,47 @@ class Page:
         self._version += 1
         return None
 
-    def _list(self, folder: Path, action: Json) -> Json:
+    def _list(self, folder: Path, only: str, start: Any) -> Json:
         """Some touches of those that a word selects, how many these are, the words with
         the number of their touches, and what is doubtful about the next one's labels."""
-        only = str(action.get("only", ""))
-        start = max(int(action.get("start", 0)), 0)
-        rows = self._rows
-        words: Counter[str] = Counter()
-        selected = []
-        for row in rows:
-            names = review.words(row["decided"], row["labels"], row["kinds"])
-            words.update(names)
-            if not only or only in names:
-                selected.append(row)
-        shown = selected[start : start + SHOWN]
-        in_use = [row["labels"] for row in rows if not row["left_out"]]
-        next_doubts = doubts([*in_use, self.labels])[-1] + too_few(in_use)
+        touches = list(self._touches.values())
+        words = [touch.words for touch in touches]
+        selected = [i for i in range(len(touches)) if only == "" or only in words[i]]
+        first = start if type(start) is int and start > 0 else 0
+        in_use = [it.standing.labels for it in touches if not it.standing.left_out]
+        doubtful = doubts([*(it.standing.labels for it in touches), self.labels])
+        last = formers(folder)[-1:]
         return {
-            "trials": [{**row, **self._course(folder / row["file"])} for row in shown],
+            "trials": [
+                {**self._row(touches[i]), "doubts": doubtful[i]}
+                for i in selected[first : first + SHOWN]
+            ],
             "total": len(selected),
-            "all": len(rows),
-            "words": sorted(words.items()),
-            "doubts": next_doubts,
+            "all": len(touches),
+            "words": sorted(Counter(chain(*words)).items()),
+            "doubts": doubtful[-1] + too_few(in_use),
+            "undo": {"time": last[0].time, "command": last[0].command}
+            if last
+            else None,
         }
 
-    def _course(self, path: Path) -> Json:
-        """The seconds and the curve of a touch."""
-        touch = self._touches.get(path.name)
-        if touch is None:  # it has just gone
-            return {"seconds": 0.0, "curve": []}
-        if not touch.course:
-            touch.course = {"seconds": 0.0, "curve": []}
-            with self._naming(""):
-                trial = load(path)
+    def _row(self, touch: Touch) -> Json:
+        """What the list says of a touch."""
+        file = touch.path.name
+        if file not in self._courses:
+            self._courses[file] = {"seconds": 0.0, "curve": []}
+            with self._naming():
+                trial = load(touch.path)
                 seconds = round(float(np.ptp(trial.t)), 2)
-                touch.course = {"seconds": seconds, "curve": review.curve(trial)}
-        return touch.course
+                self._courses[file] = {"seconds": seconds, "curve": review.curve(trial)}
+        return {
+            "file": file,
+            **touch.standing._asdict(),
+            **self._courses[file],
+            "decided": review.decisions(touch.meta),
+            "accepted": review.accepted(touch.meta, touch.standing.labels),
+            "kinds": touch.kinds,
+        }
 
     def _switch(self, on: bool) -> None:
         """Begin or stop saving trials.

@@ -449,4 +449,4 @@ class Recorder:
             )
         self.lines.write([event])
         if self.page is not None:
-            self.page.saved(path, trial)
+            self.page.saved()

@@ -1,14 +1,16 @@
 """What a person sees of a recorded touch: its curve, its decisions, and which touches
 ask for a look."""
 
-from collections.abc import Collection, Mapping, Sequence
-from typing import Any
+from collections.abc import Mapping, Sequence
+from functools import cache
+from pathlib import Path
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from edge.errors import InputError
 from edge.events import Decided
-from edge.labels import CATEGORY, Labels
+from edge.labels import CATEGORY, Labels, Standing, read_table
 from edge.recording import Recording
 
 UNKNOWN = "unknown"
@@ -106,28 +108,61 @@ def accepted(meta: Mapping[str, Any], labels: Labels) -> dict[str, str]:
     return out
 
 
-def words(decided: Collection[str], labels: Labels, kinds: Sequence[str]) -> set[str]:
-    """What selects a recording: its kinds, the tasks that it has or that were decided,
-    and its labels, as `object=cup`."""
-    return {*kinds, *labels, *decided, *map("=".join, labels.items())}
+class Touch(NamedTuple):
+    """A recording, its metadata, how it stands, and the place that says so."""
+
+    path: Path
+    meta: Mapping[str, Any]
+    standing: Standing
+    place: str
+
+    @property
+    def kinds(self) -> list[str]:
+        """The kinds of touches that it belongs to."""
+        return kinds(self.meta, *self.standing)
+
+    @property
+    def words(self) -> set[str]:
+        """What selects it: its kinds, its tasks and those that were decided, and its
+        labels, such as `object=cup`."""
+        labels = self.standing.labels
+        return {
+            *self.kinds,
+            *labels,
+            *decisions(self.meta),
+            *map("=".join, labels.items()),
+        }
 
 
-def require_words(
-    selecting: Sequence[str], touches: Sequence[tuple[Mapping[str, Any], Labels]]
-) -> None:
-    """Refuse words that name no kind, no task of some touches, and no label of one.
+def touches(metas: Mapping[Path, Mapping[str, Any]]) -> list[Touch]:
+    """How recordings stand.
+
+    Args:
+        metas: their metadata, with the labels that they were recorded with.
 
     Raises:
-        InputError: the sentence lists what there is.
+        InputError: a table is damaged, or labels contacts that have their own labels.
     """
-    if selecting:
-        tasks = {
-            task for meta, labels in touches for task in (*labels, *decisions(meta))
-        }
-        names = {*KINDS, *tasks}
-        for word in selecting:
-            if word not in names and word.partition("=")[0] not in tasks:
-                raise InputError(
-                    f"--only takes {', '.join([*KINDS, *sorted(tasks)])}, or TASK=LABEL, "
-                    f"not {word!r}"
-                )
+    table_of = cache(read_table)
+    out = []
+    for path, meta in metas.items():
+        table = table_of(path.parent)
+        row = table.rows.get(path.name)
+        place = f"{path}, line {row.line} of {table.path.name}" if row else str(path)
+        out.append(Touch(path, meta, table.standing(path.name, meta), place))
+    return out
+
+
+def selected(among: Sequence[Touch], words: Sequence[str]) -> list[Touch]:
+    """The touches that all words select.
+
+    Raises:
+        InputError: one names no kind, no task, and no label of a task; the sentence
+            lists these.
+    """
+    tasks = {t for it in among for t in (*it.standing.labels, *decisions(it.meta))}
+    for word in words:
+        if word not in {*KINDS, *tasks} and word.partition("=")[0] not in tasks:
+            names = ", ".join([*KINDS, *sorted(tasks)])
+            raise InputError(f"--only takes {names}, or TASK=LABEL, not {word!r}")
+    return [touch for touch in among if not words or touch.words.issuperset(words)]

@@ -2,8 +2,9 @@
 
 import re
 from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from difflib import SequenceMatcher
+from itertools import chain
 
 from edge.labels import CATEGORY
 
@@ -17,8 +18,8 @@ LETTERS_PER_SLIP = 7
 """Letters of a name for each wrong one, of which one is always allowed."""
 SPACES = re.compile(r"[\s_-]+")
 MOST_NAMES = 500
-MOST = 8
-"""Sentences of a kind."""
+MOST = 20
+"""Sentences."""
 MOST_PLACES = 3
 """Recordings that a sentence names."""
 
@@ -27,54 +28,46 @@ Labels = Sequence[Mapping[str, str]]
 
 
 def slips(labels: Labels, places: Sequence[str]) -> list[str]:
-    """A sentence for each kind of label that is probably a slip, with some of the places
-    (n,) of the recordings.
+    """A sentence for each label that is probably a slip or contradicts others, with some
+    of the places (n,) of its recordings.
 
     >>> slips([{"object": "box"}] * 8 + [{"object": "Box"}], list("abcdefghi"))
-    ["object='Box' on 1 of 9 recordings (i); is it 'box'?"]
+    ["object='Box': is it 'box'? (1 of 9 recordings: i)"]
     """
-    trials = list(zip(labels, places, strict=True))
-    of_tasks = _by((task, place) for trial, place in trials for task in trial)
-    sentences = _rare("task ", of_tasks, len(labels))
-    odd = _by((CATEGORY.contradiction(trial), place) for trial, place in trials)
-    for sentence, where in odd.items():
-        if sentence:
-            sentences.append(f"{sentence}, on {_some(where, len(labels))}")
-    for task in sorted(of_tasks):
-        given = _by((trial[task], place) for trial, place in trials if task in trial)
-        sentences += _rare(f"{task}=", given, len(of_tasks[task]))
-    return sentences
+    where: dict[str, list[str]] = {}
+    for place, sentences in zip(places, doubts(labels, singles=True), strict=True):
+        for sentence in sentences:
+            where.setdefault(sentence, []).append(place)
+    return [
+        f"{sentence} ({len(named)} of {len(labels)} recordings: "
+        f"{', '.join(named[:MOST_PLACES])}{', ...' * (len(named) > MOST_PLACES)})"
+        for sentence, named in list(where.items())[:MOST]
+    ]
 
 
-def _by(pairs: Iterable[tuple[str, str]]) -> dict[str, list[str]]:
-    """{name: its places}."""
-    places: dict[str, list[str]] = {}
-    for name, place in pairs:
-        places.setdefault(name, []).append(place)
-    return places
-
-
-def _some(places: Sequence[str], total: int) -> str:
-    """How many recordings of all, and the places of some."""
-    more = f" and {len(places) - MOST_PLACES} more" if places[MOST_PLACES:] else ""
-    named = "; ".join(places[:MOST_PLACES])
-    return f"{len(places)} of {total} recordings ({named}{more})"
-
-
-def doubts(labels: Labels) -> list[list[str]]:
-    """Of each recording, a sentence for each label that is probably a slip, or
-    contradicts others.
+def doubts(labels: Labels, *, singles: bool = False) -> list[list[str]]:
+    """Of each recording, a sentence for each task or label that is probably a slip, or
+    contradicts others, or (`singles`) that no other one has.
 
     >>> doubts([{"object": "box"}] * 8 + [{"object": "Box"}])[-1]
     ["object='Box': is it 'box'?"]
     """
-    slip = {}
-    for task in set().union(*labels):
-        for name, likely in _likely(_label_counts(task, labels)).items():
-            slip[task, name] = f"{task}={name!r}: is it {likely!r}?"
+    doubtful = {}
+    tasks = Counter(chain(*labels))
+    of_tasks = {task: _label_counts(task, labels) for task in sorted(tasks)}
+    for task, counts in {"": tasks, **of_tasks}.items():
+        likely = _likely(counts)
+        total = counts.total() if task else len(labels)
+        for name, count in counts.items():
+            text = f"{task}={name!r}" if task else f"task {name!r}"
+            if name in likely:
+                doubtful[task, name] = f"{text}: is it {likely[name]!r}?"
+            elif singles and count == 1 and len(counts) < total:
+                doubtful[task, name] = f"{text} stands alone"
     sentences = []
     for trial in labels:
-        named = [CATEGORY.contradiction(trial), *map(slip.get, trial.items())]
+        names = [*(("", task) for task in trial), *trial.items()]
+        named = [CATEGORY.contradiction(trial), *map(doubtful.get, names)]
         sentences.append([sentence for sentence in named if sentence])
     return sentences
 
@@ -108,25 +101,6 @@ def counts_text(labels: Labels) -> list[str]:
 def _label_counts(task: str, labels: Labels) -> Counter[str]:
     """How many recordings have each label of a task."""
     return Counter(trial[task] for trial in labels if task in trial)
-
-
-def _rare(thing: str, places: Mapping[str, Sequence[str]], total: int) -> list[str]:
-    """Sentences on the names that are probably slips.
-
-    Args:
-        thing: stands before each name.
-        places: of the recordings with each name.
-        total: recordings that could have one.
-    """
-    sentences = []
-    likely = _likely({name: len(where) for name, where in places.items()})
-    for name, where in sorted(places.items()):
-        if name in likely:
-            question = f"; is it {likely[name]!r}?"
-            sentences.append(f"{thing}{name!r} on {_some(where, total)}{question}")
-        elif len(where) == 1 and len(places) < total:
-            sentences.append(f"{thing}{name!r} on a single recording ({where[0]})")
-    return sentences[:MOST]
 
 
 def _likely(counts: Mapping[str, int]) -> dict[str, str]:

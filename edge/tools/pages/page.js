@@ -403,6 +403,7 @@ async function fetchTrials(number) {
   trials = list.trials;
   if (start && !trials.length) turn(0);
   $("doubts").replaceChildren(...list.doubts.map((text) => element("li", text)));
+  drawUndo(list);
   drawTrials();
 }
 
@@ -579,11 +580,10 @@ function draw(picture) {
   drawContact(picture);
   drawDecisions(picture);
   drawRecord(picture);
-  drawUndo(picture);
   drawNotices(picture);
 }
 
-$("undo").onclick = () => act({ do: "undo", time: latest.undo.time });
+$("undo").onclick = () => act({ do: "undo", time: list.undo.time });
 $("all").onchange = () => tickAll($("all").checked);
 $("accept-ticked").onclick = async () => await change("accept", ticked()) && tickAll(false);
 $("label-ticked").onclick = () => edit($("ticked"), ticked());

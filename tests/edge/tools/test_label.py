@@ -155,7 +155,8 @@ def test_all_that_have_a_label_get_another_and_slips_are_told_with_their_files(
         name = "cupp" if number < 1 else "cup"
         save(tmp_path / f"{number}.npz", make_touch(labels={"object": name}))
     err = edge("label", tmp_path)[2]
-    assert f"'cupp' on 1 of 9 recordings ({tmp_path / '0.npz'}); is it 'cup'?" in err
+    slip = f"'cupp': is it 'cup'? (1 of 9 recordings: {tmp_path / '0.npz'})"
+    assert slip in err
     lines = edge(
         "label", tmp_path, "--only", "object=cupp", "--set", "object=cup", "--yes"
     )

@@ -108,7 +108,12 @@ def files(page, **asked):
 
 
 def undo(page):
-    act(page, "undo", time=page._undo["time"])
+    act(page, "undo", time=last(page)["time"])
+
+
+def last(page):
+    """The change that can be undone."""
+    return act(page, "trials")["undo"]
 
 
 def test_labels_and_recording_are_set_from_the_page(page):
@@ -194,15 +199,15 @@ def test_a_damaged_recording_is_named_and_left_out(folder_page):
 
 def test_the_last_change_is_undone_unless_it_is_another_than_was_shown(folder_page):
     change(folder_page, "relabel", "a.npz", **SPONGE)
-    shown = folder_page._undo
+    shown = last(folder_page)
     change(folder_page, "leave_out", "b.npz")
     with pytest.raises(InputError, match="have been changed since"):
         act(folder_page, "undo", time=shown["time"])
     undo(folder_page)
-    assert folder_page._undo == shown
+    assert last(folder_page) == shown
     assert shown["command"] == "relabel a.npz object=sponge"
     undo(folder_page)
-    assert folder_page._undo is None
+    assert last(folder_page) is None
     assert [touch["labels"] for touch in listed(folder_page)] == [TOUCH.labels] * 2
 
 

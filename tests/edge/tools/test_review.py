@@ -1,11 +1,13 @@
 """What asks for a look at a touch, and its course in a few numbers."""
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from edge.errors import InputError
+from edge.labels import Standing
 from edge.tools import review
 from tests.edge.tools.kept import kept_meta
 
@@ -49,18 +51,17 @@ def test_what_is_accepted_contradicts_no_label_of_a_person():
     assert review.accepted(meta, {"softness": "soft"}) == {"mobility": "fixed"}
 
 
+def touched(meta, labels):
+    return review.Touch(Path("a.npz"), meta, Standing(labels), "a.npz")
+
+
 def test_a_recording_is_selected_by_its_kinds_tasks_and_labels():
-    words = review.words({"a": {}}, {"b": "z"}, ["unsure"])
-    assert words == {"unsure", "a", "b", "b=z"}
-
-
-def test_a_word_that_selects_nothing_that_could_be_is_refused_with_the_list():
-    touches = [(kept_meta({}, a=("x", 0.5)), {"b": "z"})]
-    review.require_words(["left_out", "a", "b=anything"], touches)
-    with pytest.raises(
-        InputError, match="wrong, unlabelled, left_out, a, b, or TASK=L"
-    ):
-        review.require_words(["unsur"], touches)
+    touch = touched(kept_meta({}, a=("x", 0.5)), {"b": "z"})
+    assert touch.words == {"unsure", "unlabelled", "a", "b", "b=z"}
+    assert review.selected([touch], ["unsure", "a", "b=z"]) == [touch]
+    assert review.selected([touch], ["left_out", "b=anything"]) == []
+    with pytest.raises(InputError, match="unlabelled, left_out, a, b, or TASK=LABEL"):
+        review.selected([touch], ["unsur"])
 
 
 def test_a_course_is_in_percent_of_its_highest_and_misses_no_peak(make_touch):

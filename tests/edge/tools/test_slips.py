@@ -33,10 +33,10 @@ def test_a_rare_label_that_is_spelled_like_a_frequent_one_is_named(
     counts,
 ):
     labels = trials(dict(zip((meant, label), counts, strict=True)))
-    where = "; ".join(places(labels)[counts[0] :][:3]) + " and 1 more" * (counts[1] > 3)
+    where = ", ".join([*places(labels)[counts[0] :][:3], *["..."] * (counts[1] > 3)])
     sentence = (
-        f"object={label!r} on {counts[1]} of {sum(counts)} recordings ({where}); is it "
-        f"{meant!r}?"
+        f"object={label!r}: is it {meant!r}? ({counts[1]} of {sum(counts)} recordings: "
+        f"{where})"
     )
     assert slips(labels, places(labels)) == [sentence]
 
@@ -58,15 +58,14 @@ def test_labels_that_are_meant_are_no_slips(counts):
 
 def test_a_label_with_one_trial_is_named():
     labels = trials({"box": 5, "tree": 1})
-    assert slips(labels, places(labels)) == [
-        "object='tree' on a single recording (5.npz)"
-    ]
+    (sentence,) = slips(labels, places(labels))
+    assert sentence == "object='tree' stands alone (1 of 6 recordings: 5.npz)"
 
 
 def test_a_task_that_nearly_all_trials_lack_is_named_with_what_is_meant():
     labels = [{"category": "soft-fixed"}] * 55 + [{"categroy": "soft-fixed"}]
     assert slips(labels, places(labels))[0] == (
-        "task 'categroy' on 1 of 56 recordings (55.npz); is it 'category'?"
+        "task 'categroy': is it 'category'? (1 of 56 recordings: 55.npz)"
     )
 
 
@@ -76,7 +75,7 @@ def test_a_category_that_contradicts_softness_and_mobility_is_named():
     labels = [right] * 9 + [wrong] * 3
     assert slips(labels, places(labels))[0] == (
         "category='soft-fixed' contradicts softness and mobility, which say "
-        "'rigid-fixed', on 3 of 12 recordings (9.npz; 10.npz; 11.npz)"
+        "'rigid-fixed' (3 of 12 recordings: 9.npz, 10.npz, 11.npz)"
     )
 
 
