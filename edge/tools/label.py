@@ -9,14 +9,15 @@ back, ten times. The next `make export` trains on the new labels.
 
 import argparse
 import os
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from functools import cache
 from pathlib import Path
 from typing import Any
 
 from edge.commands.output import LOG, Output, counted
 from edge.commands.texts import labels_text
 from edge.errors import InputError
-from edge.labels import Standing, read_table
+from edge.labels import Standing, Table, read_table
 from edge.recording import read_meta
 from edge.saving import listed, remarks
 from edge.tools import review
@@ -87,9 +88,10 @@ def run(arguments: argparse.Namespace) -> int:
         raise InputError("--set and --unset name a task twice; name it once")
     if arguments.leave_out and arguments.put_back:
         raise InputError("--leave-out and --put-back contradict each other; give one")
-    touches = read(listed(arguments.data))
+    table_of = cache(read_table)
+    touches = read(listed(arguments.data), table_of)
     for folder in dict.fromkeys(touch.path.parent for touch in touches):
-        for sentence in remarks(read_table(folder)):
+        for sentence in remarks(table_of(folder)):
             LOG.warning(sentence)
     selected = review.selected(touches, arguments.only)
     if not selected:
@@ -101,9 +103,9 @@ def run(arguments: argparse.Namespace) -> int:
     return 0
 
 
-def read(paths: Iterable[Path]) -> list[Touch]:
+def read(paths: Iterable[Path], table_of: Callable[[Path], Table]) -> list[Touch]:
     """The recordings of some files."""
-    return review.touches({path: read_meta(path) for path in paths})
+    return review.touches({path: read_meta(path) for path in paths}, table_of)
 
 
 def _change(
@@ -138,12 +140,11 @@ def _change(
     if not arguments.yes:
         raise InputError(f"{number} would change, as shown; add --yes to do it")
     when = now()
+    tables = {}
     for folder, changes in by_folder.items():
-        change(folder, changes, when, arguments.command)
-    _print(
-        output,
-        read(folder / file for folder in by_folder for file in by_folder[folder]),
-    )
+        tables[folder] = change(folder, changes, when, arguments.command)
+    paths = [folder / file for folder in by_folder for file in by_folder[folder]]
+    _print(output, read(paths, tables.__getitem__))
     return 0
 
 

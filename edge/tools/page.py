@@ -8,6 +8,7 @@ import tempfile
 from collections import Counter, deque
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from functools import cache
 from itertools import chain
 from pathlib import Path
 from typing import Any
@@ -17,7 +18,7 @@ import numpy as np
 from edge.errors import InputError
 from edge.events import Decided, Event, Onset
 from edge.files import parsing
-from edge.labels import Standing
+from edge.labels import Standing, read_table
 from edge.recording import load, read_meta
 from edge.skin.loop import Schedule
 from edge.tools import review
@@ -196,7 +197,7 @@ class Page:
             with self._naming("; the list skips it"):
                 metas[path] = known.get(path) or read_meta(path)
         with self._naming():
-            touches = review.touches(metas)
+            touches = review.touches(metas, cache(read_table))
             touches.sort(key=lambda touch: touch.path.stat().st_mtime_ns)
             self._touches = {touch.path.name: touch for touch in reversed(touches)}
 

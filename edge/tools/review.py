@@ -1,8 +1,7 @@
 """What a person sees of a recorded touch: its curve, its decisions, and which touches
 ask for a look."""
 
-from collections.abc import Mapping, Sequence
-from functools import cache
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -10,7 +9,7 @@ import numpy as np
 
 from edge.errors import InputError
 from edge.events import Decided
-from edge.labels import CATEGORY, Labels, Standing, read_table
+from edge.labels import CATEGORY, Labels, Standing, Table
 from edge.recording import Recording
 
 UNKNOWN = "unknown"
@@ -134,16 +133,18 @@ class Touch(NamedTuple):
         }
 
 
-def touches(metas: Mapping[Path, Mapping[str, Any]]) -> list[Touch]:
+def touches(
+    metas: Mapping[Path, Mapping[str, Any]], table_of: Callable[[Path], Table]
+) -> list[Touch]:
     """How recordings stand.
 
     Args:
         metas: their metadata, with the labels that they were recorded with.
+        table_of: gives a folder's table.
 
     Raises:
         InputError: a table is damaged, or labels contacts that have their own labels.
     """
-    table_of = cache(read_table)
     out = []
     for path, meta in metas.items():
         table = table_of(path.parent)
