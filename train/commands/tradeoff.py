@@ -55,10 +55,10 @@ def run(arguments: argparse.Namespace) -> int:
     """Work and write."""
     from train.tradeoff.run import Options, require_enough, tradeoff
 
-    check_writable(arguments.out)  # before the work
     if arguments.check:
         require_enough(len(find(arguments.data)))
         return 0
+    check_writable(arguments.out)  # before the work
     if arguments.board is None:
         raise InputError("give --board board.json, which `edge-classify bench` writes")
     options = Options(
