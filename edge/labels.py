@@ -197,7 +197,9 @@ def read_table(folder: Path, column: str = FILE) -> Table:
             io.StringIO(text, newline=""), delimiter=delimiter, strict=True
         )
         cells = [(lines.line_num, [cell.strip() for cell in line]) for line in lines]
-    _, header = cells[0] if cells else (0, [])
+    header = cells[0][1] if cells else []
+    while header[1:] and not header[-1]:  # a spreadsheet may end lines with empty cells
+        header.pop()
     with about(f"{path}, line 1"):
         _check_header(header, column)
     rows: dict[str, Row] = {}
@@ -224,8 +226,8 @@ def _check_header(header: Sequence[str], column: str) -> None:
     if not {FILE, column} & set(header):
         raise InputError(f"has no column {column}")
     for name in header:
-        if name and header.count(name) > 1:
-            raise InputError(f"has the column {name} twice")
+        if header.count(name) > 1:
+            raise InputError(f"has the column {name!r} twice")
         if name not in (FILE, LEFT_OUT) and _is_reserved(name):
             raise InputError(
                 f"the column {name!r} is unknown; write {FILE} or {LEFT_OUT}"
@@ -240,18 +242,15 @@ def _row(
     Raises:
         InputError: a cell is missing, or has no column, or cannot be understood.
     """
-    names = [*header, *[""] * (len(values) - len(header))]
-    pairs = list(zip(names, values, strict=False))
-    if len(values) < len(header) or any(value for name, value in pairs if not name):
+    cells = dict(zip(header, values, strict=False))
+    if len(values) < len(header) or any([*values[len(header) :], cells.pop("", "")]):
         raise InputError(f"has not the {len(header)} cells of the first line")
-    labels = {name: value for name, value in pairs if name}
-    file = labels.pop(FILE, "") or labels.pop(column, "")
-    answer = labels.pop(LEFT_OUT, "")
+    file = cells.pop(FILE, "") or cells.pop(column, "")
+    answer = cells.pop(LEFT_OUT, "")
     if not file:
         raise InputError("names no file")
     if answer.casefold() not in ANSWERS:
         raise InputError(f"{LEFT_OUT} is yes or empty, not {answer!r}")
-    for text in (*labels, *labels.values()):
-        if not text.isprintable():
-            raise InputError(f"{text!r} cannot be printed")
-    return file, Row(labels, ANSWERS[answer.casefold()], line)
+    if not "".join([*cells, *cells.values()]).isprintable():
+        raise InputError("has a label that cannot be printed")
+    return file, Row(cells, ANSWERS[answer.casefold()], line)

@@ -6,11 +6,11 @@ import logging
 import os
 import re
 import zipfile
-from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import nullcontext
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any, BinaryIO, Self
+from typing import IO, Any, BinaryIO, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,6 +31,7 @@ FASTEST_HZ = 5000.0
 """Frame rates outside these limits are probably times in another unit."""
 LOG = logging.getLogger(__name__)
 KEYS = ("t", "frames", "joints", "valid", "shear", "meta")
+PARTS = [f"{key}.npy" for key in KEYS]
 TEXT = re.compile(
     rb"\x93NUMPY\x01\0..{'descr': '<U(\d+)', 'fortran_order': False, 'shape': \(\), } *\n",
     re.DOTALL,
@@ -285,7 +286,7 @@ def load_arrays(
     path: str | os.PathLike[str],
     file: BinaryIO | None = None,
     keys: Sequence[str] | None = None,
-    known: Collection[str] | None = None,
+    known: Sequence[str] = (),
 ) -> dict[str, Array]:
     """Arrays of an `.npz`, read without pickle.
 
@@ -296,7 +297,7 @@ def load_arrays(
         path: of the file, for errors.
         file: its contents, if they have been read already.
         keys: names of arrays; those that the file has are read. None reads all.
-        known: names that the file may have; any where None.
+        known: names of the parts that the file may have; any where there are none.
 
     Raises:
         InputError: the file is missing, damaged, larger than `LARGEST_BYTES`, or holds
@@ -309,29 +310,41 @@ def load_arrays(
         parsing(name, "a readable .npz file", "; copy or record it again"),
         zipfile.ZipFile(contents) as archive,
     ):
-        members: dict[str, zipfile.ZipInfo] = {}
-        for info in archive.infolist():
-            key = info.filename.removesuffix(".npy")
-            if known and (key == info.filename or key in members or key not in known):
-                raise InputError(
-                    f"{name}: has a part {short_text(info.filename)}, which no recording "
-                    "has, or has twice; copy or record it again"
-                )
-            if key != info.filename:
-                members[key] = info
-        members = {key: members[key] for key in members if keys is None or key in keys}
+        if known:
+            _check_parts(name, archive.namelist(), known)
+        members = _members(archive, keys)
         if sum(info.file_size for info in members.values()) > LARGEST_BYTES:
             raise InputError(
                 f"{name}: claims arrays of more than {LARGEST_BYTES} bytes; split it"
             )
         arrays = {}
         for key, info in members.items():
-            if key == "meta":
-                arrays[key] = _text(archive.read(info))
-                continue
             with archive.open(info) as stream:
-                arrays[key] = np.lib.format.read_array(stream, allow_pickle=False)
+                arrays[key] = _text(stream.read()) if key == "meta" else _array(stream)
     return arrays
+
+
+def _members(
+    archive: zipfile.ZipFile, keys: Sequence[str] | None
+) -> dict[str, zipfile.ZipInfo]:
+    """{key: the part that holds its array}, of some keys or of all."""
+    members = {}
+    for info in archive.infolist():
+        key = info.filename.removesuffix(".npy")
+        if key != info.filename and (keys is None or key in keys):
+            members[key] = info
+    return members
+
+
+def _check_parts(name: str, files: Sequence[str], known: Sequence[str]) -> None:
+    """Refuse a file with a part that is not known, or there twice: its name is damaged,
+    and what it holds would be lost in silence."""
+    for file in files:
+        if file not in known or files.count(file) > 1:
+            raise InputError(
+                f"{name}: has a part {short_text(file)}, which no recording has, or has "
+                "twice; copy or record it again"
+            )
 
 
 def _text(contents: bytes) -> Array:
@@ -340,8 +353,14 @@ def _text(contents: bytes) -> Array:
     head = TEXT.match(contents)
     text = contents[head.end() :].decode("utf-32-le") if head else ""
     if head is None or len(text) != int(head[1]):
-        return np.lib.format.read_array(io.BytesIO(contents), allow_pickle=False)
+        return _array(io.BytesIO(contents))
     return np.array(text)
+
+
+def _array(stream: IO[bytes]) -> Array:
+    """The array in a `.npy` file."""
+    array: Array = np.lib.format.read_array(stream, allow_pickle=False)
+    return array
 
 
 def load_meta(name: str, arrays: dict[str, Array]) -> dict[str, Any]:
@@ -368,7 +387,7 @@ def read_meta(path: str | os.PathLike[str]) -> dict[str, Any]:
         InputError: as `load`.
     """
     name = os.fspath(path)
-    meta = load_meta(name, load_arrays(name, keys=("meta",), known=KEYS))
+    meta = load_meta(name, load_arrays(name, keys=("meta",), known=PARTS))
     with about(name):
         return {**meta, "labels": read_labels(name, meta.get("labels", {}))}
 
@@ -398,7 +417,7 @@ def load(
             says, or the file is missing; the sentence names it and the remedy.
     """
     name = os.fspath(path)
-    arrays = load_arrays(name, file, known=KEYS)
+    arrays = load_arrays(name, file, known=PARTS)
     for key in ("t", "frames"):
         if key not in arrays:
             raise InputError(

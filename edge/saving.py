@@ -3,7 +3,7 @@
 import json
 import logging
 import os
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -134,26 +134,25 @@ def find(paths: Iterable[str]) -> list[Path]:
         raise InputError(
             f"{table_of(files[0].parent).path}: leaves every recording out"
         )
-    for folder in dict.fromkeys(file.parent for file in files):
-        for sentence in remarks(table_of(folder)):
-            LOG.warning(sentence)
+    warn_of_remains(files, table_of)
     return out
 
 
-def remarks(table: Table) -> Iterator[str]:
-    """A sentence on the rows of a table whose file is gone, and on each thing that a
-    former release left in its folder."""
-    folder = table.path.parent
-    gone = [file for file in table.rows if not os.path.lexists(folder / file)]
-    if gone:
-        others = f" (and {len(gone) - 1} more)" if len(gone) > 1 else ""
-        yield (
-            f"{table.path}, line {table.rows[gone[0]].line}: there is no {gone[0]} "
-            f"here{others}; take the line out, or bring the file back"
-        )
-    for name, what in OLDER.items():
-        if os.path.lexists(folder / name):
-            yield f"{folder / name}: {what}; it is left alone"
+def warn_of_remains(files: Iterable[Path], table_of: Callable[[Path], Table]) -> None:
+    """Warn of rows in the tables of files whose own file is gone, and of what former
+    releases left in their folders."""
+    for folder in dict.fromkeys(file.parent for file in files):
+        table = table_of(folder)
+        gone = [file for file in table.rows if not os.path.lexists(folder / file)]
+        if gone:
+            others = f" (and {len(gone) - 1} more)" if len(gone) > 1 else ""
+            LOG.warning(
+                f"{table.path}, line {table.rows[gone[0]].line}: there is no {gone[0]} "
+                f"here{others}; take the line out, or bring the file back"
+            )
+        for name, what in OLDER.items():
+            if os.path.lexists(folder / name):
+                LOG.warning(f"{folder / name}: {what}; it is left alone")
 
 
 def recordings_in(folder: Path) -> list[Path]:

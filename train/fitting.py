@@ -133,7 +133,6 @@ def fit(data: DataSet | str | Path | Sequence[str | Path], **options: Any) -> Fi
     labels = [trial.labels for trial in loaded.dataset.trials]
     places = [str(trial.path) for trial in loaded.dataset.trials]
     doubts = [f"warning: probably a slip: {text}" for text in slips(labels, places)]
-    doubts += too_few(labels)
     if len(labels) < FEWEST_TRIALS:
         raise InputError(
             f"a fit needs at least {FEWEST_TRIALS} trials, not {len(labels)}; record more"
@@ -143,7 +142,7 @@ def fit(data: DataSet | str | Path | Sequence[str | Path], **options: Any) -> Fi
     notes = [*doubts, *lacking(loaded.dataset, fixed.tasks), *loaded.notes]
     notes += [*_of_unseen(settings, fixed), *leaks(measured, y)]
     points = decision_points(measured, settings, fixed, notes)
-    notes += settings.notes
+    notes += [*settings.notes, *too_few(labels)]
     if len(points) < 2:
         settings = replace(settings, early=None)
     dataset = measured.of(sorted(settings.features()))

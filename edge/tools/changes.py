@@ -180,12 +180,13 @@ def _contents(folder: Path) -> bytes:
     return read_bytes(path) if os.path.lexists(path) else b""
 
 
-def undo(folder: Path, former: Former) -> None:
-    """Bring a former table back, which must be the last.
+def undo(former: Former) -> Path:
+    """Bring a former table back, which must be the last of its folder; the folder.
 
     Raises:
         InputError: the table has been changed since.
     """
+    folder = former.path.parents[1]
     with alone(folder):
         if formers(folder)[-1:] != [former]:
             raise InputError(f"{folder}: labels have been changed since; look again")
@@ -196,3 +197,4 @@ def undo(folder: Path, former: Former) -> None:
             )
         _write(folder / TABLE, former.contents)
         former.path.unlink(missing_ok=True)
+    return folder

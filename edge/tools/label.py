@@ -14,12 +14,12 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-from edge.commands.output import LOG, Output, counted
+from edge.commands.output import Output, counted
 from edge.commands.texts import labels_text
 from edge.errors import InputError
 from edge.labels import Standing, Table, read_table
 from edge.recording import read_meta
-from edge.saving import listed, remarks
+from edge.saving import listed, warn_of_remains
 from edge.tools import review
 from edge.tools.changes import FORMER, Change, Former, change, formers, now, undo
 from edge.tools.review import Touch
@@ -86,18 +86,15 @@ def run(arguments: argparse.Namespace) -> int:
     tasks = {*arguments.unset, *dict(arguments.set)}
     if len(tasks) < len(arguments.unset + arguments.set):
         raise InputError("--set and --unset name a task twice; name it once")
-    if arguments.leave_out and arguments.put_back:
-        raise InputError("--leave-out and --put-back contradict each other; give one")
     table_of = cache(read_table)
-    touches = read(listed(arguments.data), table_of)
-    for folder in dict.fromkeys(touch.path.parent for touch in touches):
-        for sentence in remarks(table_of(folder)):
-            LOG.warning(sentence)
+    paths = listed(arguments.data)
+    warn_of_remains(paths, table_of)
+    touches = read(paths, table_of)
     selected = review.selected(touches, arguments.only)
     if not selected:
         output.text(f"none of {counted(len(touches), 'recording')} is of this kind")
         return 1
-    if any(getattr(arguments, name) for name in CHANGES):
+    if any(map(vars(arguments).get, CHANGES)):
         return _change(arguments, output, selected)
     _print(output, selected)
     return 0
@@ -118,21 +115,7 @@ def _change(
     Raises:
         InputError: --yes is missing, or a recording has been changed meanwhile.
     """
-    by_folder: dict[Path, dict[str, Change]] = {}
-    for path, meta, before, place in touches:
-        labels = changed(
-            meta,
-            before.labels,
-            dict(arguments.set),
-            arguments.unset,
-            accepts=arguments.accept,
-        )
-        left_out = (before.left_out or arguments.leave_out) and not arguments.put_back
-        after = Standing(labels, left_out)
-        if after != before:
-            output.text(f"{path}: {_text(before)} becomes {_text(after)}")
-        if after != before or (arguments.rows and place == str(path)):
-            by_folder.setdefault(path.parent, {})[path.name] = Change(before, after)
+    by_folder = _shown(arguments, output, touches)
     if not by_folder:
         output.text(f"none of {counted(len(touches), 'recording')} would change")
         return 0
@@ -148,25 +131,53 @@ def _change(
     return 0
 
 
+def _shown(
+    arguments: argparse.Namespace, output: Output, touches: Sequence[Touch]
+) -> dict[Path, dict[str, Change]]:
+    """{folder: {file: what changes}}, which is shown."""
+    by_folder: dict[Path, dict[str, Change]] = {}
+    for touch in touches:
+        path = touch.path
+        before = touch.standing
+        after = _after(arguments, touch)
+        if after != before:
+            output.text(f"{path}: {_text(before)} becomes {_text(after)}")
+        if after != before or (arguments.rows and touch.place == str(path)):
+            by_folder.setdefault(path.parent, {})[path.name] = Change(before, after)
+    return by_folder
+
+
+def _after(arguments: argparse.Namespace, touch: Touch) -> Standing:
+    """How a recording stands after the change."""
+    labels = changed(
+        touch.meta,
+        touch.standing.labels,
+        dict(arguments.set),
+        arguments.unset,
+        accepts=arguments.accept,
+    )
+    left_out = touch.standing.left_out or arguments.leave_out
+    return Standing(labels, left_out and not arguments.put_back)
+
+
 def _undo(data: Sequence[str], output: Output) -> int:
     """Take the last change back, in all the folders in which it was made.
 
     Raises:
         InputError: there is nothing to take back, or no such folder.
     """
-    last: dict[Path, Former] = {}
+    last: list[Former] = []
     for name in data:
         if not os.path.isdir(name):
             raise InputError(f"{name}: --undo takes the folder of the recordings")
-        folders = [place for place, inside, _ in os.walk(name) if FORMER in inside]
-        for folder in map(Path, folders):
-            last.update((folder, former) for former in formers(folder)[-1:])
+        for place in Path(name).rglob(FORMER):
+            last += formers(place.parent)[-1:]
     if not last:
         raise InputError(f"{', '.join(data)}: there is no change to take back")
-    latest = max(former.time for former in last.values())
-    for folder, former in last.items():
+    latest = max(former.time for former in last)
+    for former in last:
         if former.time == latest:
-            undo(folder, former)
+            folder = undo(former)
             output.text(
                 f"{folder}: is as before `{former.command}` of {latest[:19]} UTC"
             )

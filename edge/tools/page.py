@@ -9,7 +9,7 @@ from collections import Counter, deque
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from functools import cache
-from itertools import chain
+from itertools import starmap
 from pathlib import Path
 from typing import Any
 
@@ -83,8 +83,9 @@ class Page:
                 read.
         """
         self._folder = folder
-        self.labels = {task: label for task, label in (labels or {}).items() if label}
-        self._waits = {task for task in labels or {} if task not in self.labels}
+        given = dict(labels or {})
+        self.labels = {task: label for task, label in given.items() if label}
+        self._waits = given.keys() - self.labels.keys()
         self.recording = bool(self.labels) and not self._waits
         self._touches: dict[str, Touch] = {}
         """Those of the folder by file, the newest first."""
@@ -250,28 +251,27 @@ class Page:
         """Some touches of those that a word selects, how many these are, the words with
         the number of their touches, and what is doubtful about the next one's labels."""
         touches = list(self._touches.values())
-        words = [touch.words for touch in touches]
-        selected = [i for i in range(len(touches)) if only == "" or only in words[i]]
-        first = start if type(start) is int and start > 0 else 0
-        in_use = [it.standing.labels for it in touches if not it.standing.left_out]
-        doubtful = doubts([*(it.standing.labels for it in touches), self.labels])
+        labels = [touch.standing.labels for touch in touches]
+        doubtful = doubts([*labels, self.labels])
+        words: Counter[str] = Counter()
+        rows = []
+        for touch, sentences in zip(touches, doubtful, strict=False):
+            words.update(touch.words)
+            if only == "" or only in touch.words:
+                rows.append((touch, sentences))
+        first = max(int(start or 0), 0)
         last = formers(folder)[-1:]
         return {
-            "trials": [
-                {**self._row(touches[i]), "doubts": doubtful[i]}
-                for i in selected[first : first + SHOWN]
-            ],
-            "total": len(selected),
+            "trials": list(starmap(self._row, rows[first : first + SHOWN])),
+            "total": len(rows),
             "all": len(touches),
-            "words": sorted(Counter(chain(*words)).items()),
-            "doubts": doubtful[-1] + too_few(in_use),
-            "undo": {"time": last[0].time, "command": last[0].command}
-            if last
-            else None,
+            "words": sorted(words.items()),
+            "doubts": doubtful[-1] + too_few(labels),
+            "undo": [{"time": it.time, "command": it.command} for it in last],
         }
 
-    def _row(self, touch: Touch) -> Json:
-        """What the list says of a touch."""
+    def _row(self, touch: Touch, sentences: Sequence[str]) -> Json:
+        """What the list says of a touch, with what is doubtful about its labels."""
         file = touch.path.name
         if file not in self._courses:
             self._courses[file] = {"seconds": 0.0, "curve": []}
@@ -286,6 +286,7 @@ class Page:
             "decided": review.decisions(touch.meta),
             "accepted": review.accepted(touch.meta, touch.standing.labels),
             "kinds": touch.kinds,
+            "doubts": sentences,
         }
 
     def _switch(self, on: bool) -> None:
@@ -337,7 +338,7 @@ class Page:
         try:
             if not last or last[0].time != action.get("time"):
                 raise InputError("the labels have been changed since; look again")
-            undo(folder, last[0])
+            undo(last[0])
         finally:
             self.look()
 

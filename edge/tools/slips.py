@@ -52,6 +52,17 @@ def doubts(labels: Labels, *, singles: bool = False) -> list[list[str]]:
     >>> doubts([{"object": "box"}] * 8 + [{"object": "Box"}])[-1]
     ["object='Box': is it 'box'?"]
     """
+    doubtful = _doubtful(labels, singles)
+    sentences = []
+    for trial in labels:
+        names = [*(("", task) for task in trial), *trial.items()]
+        named = [CATEGORY.contradiction(trial), *map(doubtful.get, names)]
+        sentences.append(list(filter(None, named)))
+    return sentences
+
+
+def _doubtful(labels: Labels, singles: bool) -> dict[tuple[str, str], str]:
+    """{(task, label), or ("", task): a sentence} of those that are probably slips."""
     doubtful = {}
     tasks = Counter(chain(*labels))
     of_tasks = {task: _label_counts(task, labels) for task in sorted(tasks)}
@@ -64,12 +75,7 @@ def doubts(labels: Labels, *, singles: bool = False) -> list[list[str]]:
                 doubtful[task, name] = f"{text}: is it {likely[name]!r}?"
             elif singles and count == 1 and len(counts) < total:
                 doubtful[task, name] = f"{text} stands alone"
-    sentences = []
-    for trial in labels:
-        names = [*(("", task) for task in trial), *trial.items()]
-        named = [CATEGORY.contradiction(trial), *map(doubtful.get, names)]
-        sentences.append([sentence for sentence in named if sentence])
-    return sentences
+    return doubtful
 
 
 def too_few(labels: Labels) -> list[str]:

@@ -2,7 +2,7 @@
 before their columns are understood."""
 
 import re
-from collections.abc import Callable, Iterable, Iterator, Sequence, Set
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence, Set
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, TypeVar
@@ -11,11 +11,10 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from edge import labels as beside
 from edge.config import short_text
 from edge.errors import InputError, about
 from edge.files import parsing
-from edge.labels import TABLE as LABELS
-from edge.labels import read_table
 from train.importers import Refused, arrays
 from train.importers.columns import columns, named_times
 from train.importers.options import TableOptions
@@ -104,8 +103,8 @@ def sources_in(path: Path, options: TableOptions) -> Iterator[Source | Refused]:
     """
     folder = path if path.is_dir() else path.parent
     sources = _sources(path, folder, options)
-    if (folder / LABELS).is_file():
-        return _labelled(list(sources), folder / LABELS, options.task)
+    if (folder / beside.TABLE).is_file():
+        return _labelled(list(sources), folder / beside.TABLE, options.task)
     return sources
 
 
@@ -119,33 +118,39 @@ def _labelled(
     Raises:
         InputError: it names none of the trials.
     """
-    trials = [source.name for source in sources if isinstance(source, Source)]
-    table = read_table(path.parent, "trial")
-    files = {_name(file, path.parent) for file in _visible(path.parent)}
-    names = {
-        row: row if row in trials else _name(path.parent / row, path.parent)
-        for row in table.rows
-    }
-    if not set(names.values()) & set(trials):
+    table = beside.read_table(path.parent, "trial")
+    trials = {source.name for source in sources if isinstance(source, Source)}
+    rows = {}
+    for row in table.rows:
+        rows[row if row in trials else _name(path.parent / row, path.parent)] = row
+    if rows.keys().isdisjoint(trials):
         raise InputError(
-            f"{path}: needs a column file with names such as {short_text(trials)}"
+            f"{path}: needs a column file with names such as {short_text(sorted(trials))}"
         )
-    for row in sorted(names):
-        if names[row] not in {*trials, *files}:
-            yield Refused(f"{path}, line {table.rows[row].line}: {row} names no file")
-    rows = {name: row for row, name in names.items()}
+    yield from _strangers(table, rows, trials)
     for source in sources:
-        if isinstance(source, Refused):
-            yield source
-            continue
-        if source.name not in rows:
-            yield Refused(f"{path}: has no row for {source.name}, which has no label")
-        labels = {**source.labels, task: ""}
-        row = rows.get(source.name, "")
-        labels, left_out = table.standing(row, {"labels": labels})
-        if not left_out:
+        if isinstance(source, Source):
+            labels, left_out = table.standing(
+                rows.get(source.name, ""), {"labels": {**source.labels, task: ""}}
+            )
+            if left_out:
+                continue
             labels = {key: label for key, label in labels.items() if label}
-            yield replace(source, labels=labels, label=LABELS)
+            source = replace(source, labels=labels, label=beside.TABLE)
+        yield source
+
+
+def _strangers(
+    table: beside.Table, rows: Mapping[str, str], trials: Set[str]
+) -> Iterator[Refused]:
+    """Rows of a labels.csv, by their trial, without a file, and trials without a row."""
+    folder = table.path.parent
+    files = {_name(file, folder) for file in _visible(folder)}
+    for name in sorted(rows.keys() - trials - files):
+        line = table.rows[rows[name]].line
+        yield Refused(f"{table.path}, line {line}: {rows[name]} names no file")
+    for name in sorted(trials - rows.keys()):
+        yield Refused(f"{table.path}: has no row for {name}, which has no label")
 
 
 def _sources(
@@ -182,7 +187,9 @@ def _visible(folder: Path) -> list[Path]:
 def _files(paths: Iterable[Path]) -> list[Path]:
     """The tables among paths."""
     return [
-        path for path in paths if path.name != LABELS and suffix_of(path) in SUFFIXES
+        path
+        for path in paths
+        if path.name != beside.TABLE and suffix_of(path) in SUFFIXES
     ]
 
 

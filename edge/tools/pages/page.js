@@ -403,7 +403,7 @@ async function fetchTrials(number) {
   trials = list.trials;
   if (start && !trials.length) turn(0);
   $("doubts").replaceChildren(...list.doubts.map((text) => element("li", text)));
-  drawUndo(list);
+  drawUndo(list.undo);
   drawTrials();
 }
 
@@ -550,9 +550,9 @@ function trialRow(trial) {
   return row;
 }
 
-function drawUndo({ undo }) {
-  $("undo").hidden = !undo;
-  if (undo) say("undo", `Undo: ${undo.command}`);
+function drawUndo([last]) {
+  $("undo").hidden = !last;
+  if (last) say("undo", `Undo: ${last.command}`);
 }
 
 // The notices are a stream's last: new are those that follow the former ones.
@@ -583,7 +583,7 @@ function draw(picture) {
   drawNotices(picture);
 }
 
-$("undo").onclick = () => act({ do: "undo", time: list.undo.time });
+$("undo").onclick = () => act({ do: "undo", time: list.undo[0].time });
 $("all").onchange = () => tickAll($("all").checked);
 $("accept-ticked").onclick = async () => await change("accept", ticked()) && tickAll(false);
 $("label-ticked").onclick = () => edit($("ticked"), ticked());

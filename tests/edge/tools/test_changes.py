@@ -85,7 +85,7 @@ def test_ten_changes_are_taken_back_one_after_another(day):
         )
     assert len(list((day / FORMER).iterdir())) == MOST_FORMER
     for number in range(10, 0, -1):
-        undo(day, formers(day)[-1])
+        undo(formers(day)[-1])
         assert objects(day)[0] == str(number)
     assert formers(day) == []
 
@@ -94,7 +94,7 @@ def test_the_first_change_is_taken_back_too(day):
     relabel(day)
     (former,) = formers(day)
     assert (former.time, former.command) == ("2026", "to {'object': 'cup'}")
-    undo(day, former)
+    undo(former)
     assert objects(day) == ["box", "box"]
 
 
@@ -103,10 +103,10 @@ def test_nobody_takes_back_what_another_has_changed_since(day):
     (mine,) = formers(day)
     relabel(day, "b.npz")
     with pytest.raises(InputError, match="have been changed since; look again"):
-        undo(day, mine)
+        undo(mine)
     (day / TABLE).write_text("file,object\na.npz,by hand\n")
     with pytest.raises(InputError, match="written since by another program"):
-        undo(day, formers(day)[-1])
+        undo(formers(day)[-1])
     assert objects(day) == ["by hand", "box"]
 
 
@@ -123,7 +123,7 @@ def test_a_change_that_is_killed_at_any_step_has_been_or_not(day, action, left):
     while objects(day) == before:
         act = partial(relabel, day)
         if action == "undo":
-            act = partial(undo, day, formers(day)[-1])
+            act = partial(undo, formers(day)[-1])
         dies(act, STEPS, next(steps))
     assert next(steps) > 2
     assert objects(day) == (["cup", "cup"] if action == "relabel" else ["box", "cup"])

@@ -108,7 +108,7 @@ def files(page, **asked):
 
 
 def undo(page):
-    act(page, "undo", time=last(page)["time"])
+    act(page, "undo", time=last(page)[0]["time"])
 
 
 def last(page):
@@ -202,12 +202,12 @@ def test_the_last_change_is_undone_unless_it_is_another_than_was_shown(folder_pa
     shown = last(folder_page)
     change(folder_page, "leave_out", "b.npz")
     with pytest.raises(InputError, match="have been changed since"):
-        act(folder_page, "undo", time=shown["time"])
+        act(folder_page, "undo", time=shown[0]["time"])
     undo(folder_page)
     assert last(folder_page) == shown
-    assert shown["command"] == "relabel a.npz object=sponge"
+    assert shown[0]["command"] == "relabel a.npz object=sponge"
     undo(folder_page)
-    assert last(folder_page) is None
+    assert last(folder_page) == []
     assert [touch["labels"] for touch in listed(folder_page)] == [TOUCH.labels] * 2
 
 
