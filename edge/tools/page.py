@@ -22,7 +22,7 @@ from edge.labels import Standing, read_table
 from edge.recording import load, read_meta
 from edge.skin.loop import Schedule
 from edge.tools import review
-from edge.tools.changes import Change, change, formers, now, undo
+from edge.tools.changes import Change, Former, change, formers, now, undo
 from edge.tools.label import changed
 from edge.tools.review import Touch
 from edge.tools.slips import doubts, too_few
@@ -260,7 +260,9 @@ class Page:
             if only == "" or only in touch.words:
                 rows.append((touch, sentences))
         first = max(int(start or 0), 0)
-        last = formers(folder)[-1:]
+        last: list[Former] = []
+        with self._naming():
+            last = formers(folder)[-1:]
         return {
             "trials": list(starmap(self._row, rows[first : first + SHOWN])),
             "total": len(rows),
