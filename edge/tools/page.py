@@ -163,10 +163,8 @@ class Page:
 
     def left_out(self, paths: Sequence[Path]) -> int:
         """How many of these recordings are left out."""
-        touches = self._touches
-        return sum(
-            it.name in touches and touches[it.name].standing.left_out for it in paths
-        )
+        touches = [self._touches.get(path.name) for path in paths]
+        return sum(it is not None and it.standing.left_out for it in touches)
 
     def _curves(self) -> Json | None:
         """The last contact: its taxels, and its features since onset."""
@@ -212,8 +210,7 @@ class Page:
                 self.notice(f"{error}{then}")
 
     def _act(self, action: Json) -> Json | None:
-        """Carry out an action of the page; the list of touches where it asks for it, with
-        what is doubtful about their labels and about those of the next one.
+        """Carry out an action of the page; the list of touches where it asks for it.
 
         Raises:
             InputError: it is none, it is not possible here, or a touch cannot be read.
@@ -223,9 +220,7 @@ class Page:
             raise InputError("this page records nothing; start it with `record --web`")
         if kind == "trials":
             self.look()
-            return self._list(
-                self._folder, str(action.get("only", "")), action.get("start")
-            )
+            return self._list(self._folder, action)
         if kind == "labels":
             self.labels = {**self.labels, **_labels(action)}
             if self._waits and self._waits <= self.labels.keys():
@@ -247,7 +242,7 @@ class Page:
         self._version += 1
         return None
 
-    def _list(self, folder: Path, only: str, start: Any) -> Json:
+    def _list(self, folder: Path, action: Json) -> Json:
         """Some touches of those that a word selects, how many these are, the words with
         the number of their touches, and what is doubtful about the next one's labels."""
         touches = list(self._touches.values())
@@ -257,9 +252,9 @@ class Page:
         rows = []
         for touch, sentences in zip(touches, doubtful, strict=False):
             words.update(touch.words)
-            if only == "" or only in touch.words:
+            if action.get("only", "") in ("", *touch.words):
                 rows.append((touch, sentences))
-        first = max(int(start or 0), 0)
+        first = max(int(action.get("start", 0)), 0)
         last: list[Former] = []
         with self._naming():
             last = formers(folder)[-1:]

@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 from edge.errors import InputError
-from edge.recording import LARGEST_BYTES, Recording, load
+from edge.npz import LARGEST_BYTES
+from edge.recording import Recording, load
 from edge.saving import find, save
 
 

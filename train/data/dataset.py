@@ -19,7 +19,8 @@ from edge.arrays import Booleans, Floats
 from edge.errors import InputError
 from edge.files import read_bytes
 from edge.labels import read_table
-from edge.recording import LARGEST_BYTES, Recording, load
+from edge.npz import LARGEST_BYTES
+from edge.recording import Recording, load
 from edge.saving import find
 from edge.touch import measures
 from edge.touch.arm import Chain
