@@ -254,7 +254,8 @@ class Page:
             words.update(touch.words)
             if action.get("only", "") in ("", *touch.words):
                 rows.append((touch, sentences))
-        first = max(int(action.get("start", 0)), 0)
+        start = str(action.get("start", 0))
+        first = int(start) if start.isdecimal() else 0
         last: list[Former] = []
         with self._naming():
             last = formers(folder)[-1:]
