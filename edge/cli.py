@@ -7,6 +7,7 @@ import gc
 import io
 import logging
 import os
+import shlex
 import sys
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
@@ -99,9 +100,41 @@ def dispatch(top: argparse.ArgumentParser, argv: Sequence[str] | None) -> int:
             import argcomplete
 
             argcomplete.autocomplete(top)
-    arguments = top.parse_args(argv)
+    arguments = parsed(top, list(sys.argv[1:] if argv is None else argv))
     with _messages(top.prog, getattr(arguments, "quiet", False)):
         return _status(top.prog, arguments)
+
+
+def parsed(top: argparse.ArgumentParser, words: Sequence[str]) -> argparse.Namespace:
+    """The arguments, with `command`, the line that gave them.
+
+    A word that stands without an option is the model or the skin, by its suffix. An
+    empty word, which a variable without a value leaves, is refused: as a path it would
+    be the current folder.
+    """
+    for i, word in enumerate(words):
+        if not word or (word.startswith("-") and word.endswith("=")):
+            where = word or f"after {[top.prog, *words][i]}"
+            top.error(f"an argument is empty ({where}); give it a value")
+    arguments, bare = top.parse_known_args(words)
+    arguments.command = shlex.join([top.prog, *words])
+    for word in bare:
+        if not _placed(word, arguments):
+            top.error(f"unrecognized arguments: {word}")
+    needed = getattr(arguments, "needs", None)
+    if needed and getattr(arguments, needed) is None:
+        top.error(f"a {needed} is required: name its file, with --{needed} or without")
+    return arguments
+
+
+def _placed(word: str, arguments: argparse.Namespace) -> bool:
+    """Take a bare word as the model or the skin; whether the command lacks one."""
+    names = ["skin", "model"] if word.endswith(".toml") else ["model", "skin"]
+    for name in names:
+        if getattr(arguments, name, "") is None and not word.startswith("-"):
+            setattr(arguments, name, word)
+            return True
+    return False
 
 
 @contextmanager

@@ -57,8 +57,10 @@ _DECODER = json.JSONDecoder(
 def decode_json(text: str | bytes) -> Any:
     """The value of a JSON text; half of a surrogate pair raises UnicodeError, as UTF-8
     has none."""
-    value = _DECODER.decode(text.decode() if isinstance(text, bytes) else text)
-    json.dumps(value, ensure_ascii=False).encode()
+    text = text.decode() if isinstance(text, bytes) else text
+    value = _DECODER.decode(text)
+    if "\\u" in text or not text.isascii():
+        json.dumps(value, ensure_ascii=False).encode()
     return value
 
 

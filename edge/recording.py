@@ -3,30 +3,27 @@ file."""
 
 import logging
 import os
-import zipfile
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import nullcontext
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from pathlib import Path
 from typing import Any, BinaryIO, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
 from edge.arrays import Array, Booleans, Counts, Floats
-from edge.config import parse_json, short_text
 from edge.errors import InputError, about
-from edge.files import open_regular, parsing
+from edge.labels import Table, plain, read_table
+from edge.npz import load_arrays, load_meta
 from edge.touch.frame import Frame
 from edge.touch.layout import SkinLayout
 
-LARGEST_BYTES = 1 << 27
-"""Largest size of a file's arrays together. An hour of 384 taxels at 40 Hz takes 111
-MB, two minutes of 64 x 62 taxels at 100 Hz take 95."""
 SLOWEST_HZ = 2.0
 FASTEST_HZ = 5000.0
 """Frame rates outside these limits are probably times in another unit."""
 LOG = logging.getLogger(__name__)
 KEYS = ("t", "frames", "joints", "valid", "shear", "meta")
+PARTS = [f"{key}.npy" for key in KEYS]
 
 
 @dataclass(frozen=True)
@@ -258,8 +255,6 @@ def read_labels(path: str, values: Any) -> dict[str, str]:
             "meta.labels and meta.contacts must map task names to labels, both text"
         )
     if not all(name.isprintable() and name == name.strip() for name in names):
-        from edge.labels import plain  # few labels need it
-
         return plain(labels, path)
     return labels
 
@@ -274,67 +269,24 @@ def _check_joint_names(names: Any, joints: Floats | None) -> None:
         )
 
 
-def load_arrays(
-    path: str | os.PathLike[str],
-    file: BinaryIO | None = None,
-    keys: Sequence[str] | None = None,
-) -> dict[str, Array]:
-    """Arrays of an `.npz`, read without pickle.
-
-    An array is filled from the file piece by piece, so a header that claims more than
-    the file holds takes no memory.
-
-    Args:
-        path: of the file, for errors.
-        file: its contents, if they have been read already.
-        keys: names of arrays; those that the file has are read. None reads all.
+def read_meta(path: str | os.PathLike[str]) -> dict[str, Any]:
+    """The metadata of a recording alone, with the labels that it was recorded with.
 
     Raises:
-        InputError: the file is missing, damaged, larger than `LARGEST_BYTES`, or holds
-            something other than plain arrays.
+        InputError: as `load`.
     """
     name = os.fspath(path)
-    opened = open_regular(name, LARGEST_BYTES) if file is None else nullcontext(file)
-    with (
-        opened as contents,
-        parsing(name, "a readable .npz file", "; copy or record it again"),
-        zipfile.ZipFile(contents) as archive,
-    ):
-        members = {}
-        for info in archive.infolist():
-            key = info.filename.removesuffix(".npy")
-            if key != info.filename and (keys is None or key in keys):
-                members[key] = info
-        if sum(info.file_size for info in members.values()) > LARGEST_BYTES:
-            raise InputError(
-                f"{name}: claims arrays of more than {LARGEST_BYTES} bytes; split it"
-            )
-        arrays = {}
-        for key, info in members.items():
-            with archive.open(info) as stream:
-                arrays[key] = np.lib.format.read_array(stream, allow_pickle=False)
-    return arrays
+    meta = load_meta(name, load_arrays(name, keys=("meta",), known=PARTS))
+    with about(name):
+        return {**meta, "labels": read_labels(name, meta.get("labels", {}))}
 
 
-def load_meta(name: str, arrays: dict[str, Array]) -> dict[str, Any]:
-    """The JSON object under `meta`."""
-    raw = arrays.get("meta")
-    if raw is None:
-        raise InputError(
-            f"{name}: meta is missing; store a JSON object as text under it"
-        )
-    if raw.dtype.kind != "U" or raw.size != 1:
-        raise InputError(
-            f"{name}: meta must be one JSON text, not {raw.dtype} {raw.shape}"
-        )
-    meta = parse_json(raw.item(), f"{name}: meta")
-    if not isinstance(meta, dict):
-        raise InputError(f"{name}: meta must be a JSON object, not {short_text(meta)}")
-    return meta
-
-
-def load(path: str | os.PathLike[str], file: BinaryIO | None = None) -> Recording:
-    """Read a recording.
+def load(
+    path: str | os.PathLike[str],
+    file: BinaryIO | None = None,
+    table_of: Callable[[Path], Table] = read_table,
+) -> Recording:
+    """Read a recording, with the labels that the table beside it says.
 
     >>> import edge
     >>> from edge import demo
@@ -347,13 +299,14 @@ def load(path: str | os.PathLike[str], file: BinaryIO | None = None) -> Recordin
     Args:
         path: of the `.npz`, which sentences name.
         file: its contents, where they have been read already.
+        table_of: gives a folder's table; `cache(read_table)` reads each once.
 
     Raises:
-        InputError: the file is missing, damaged, or not as the contract says; the
-            sentence names the file and the remedy.
+        InputError: the file or the table beside it is damaged, or not as the contract
+            says, or the file is missing; the sentence names it and the remedy.
     """
     name = os.fspath(path)
-    arrays = load_arrays(name, file, KEYS)
+    arrays = load_arrays(name, file, known=PARTS)
     for key in ("t", "frames"):
         if key not in arrays:
             raise InputError(
@@ -362,6 +315,10 @@ def load(path: str | os.PathLike[str], file: BinaryIO | None = None) -> Recordin
     fields: dict[str, Any] = {**arrays, "meta": load_meta(name, arrays)}
     recording = checked(name, Recording(**fields))
     warn_of_another_unit(name, recording.t)
+    folder, own_name = os.path.split(name)
+    table = table_of(Path(folder))
+    if own_name in table.rows:
+        recording.meta["labels"] = table.standing(own_name, recording.meta).labels
     return recording
 
 

@@ -7,7 +7,7 @@ import os
 import re
 import sys
 from collections.abc import Sequence
-from functools import partial
+from functools import cache, partial
 from pathlib import Path
 from typing import Any
 
@@ -18,9 +18,10 @@ from edge.classifier import suited
 from edge.cli import dispatch
 from edge.commands.options import within
 from edge.errors import InputError
+from edge.labels import read_table
 from edge.model.model import Model
 from edge.recording import load
-from edge.saving import find
+from edge.saving import find, listed
 from edge.tools.replay import Summary, compared, decide
 from edge.tools.slips import counts_text
 from edge.tools.trial_options import add_arm, open_arm
@@ -288,7 +289,7 @@ def _check_apart(data: list[str], held_out: Sequence[Path]) -> None:
         InputError: one of them is in the data too.
     """
     # Unlike Path.resolve, this raises nothing for a link to itself.
-    fitted = set(map(os.path.realpath, find(data)))
+    fitted = set(map(os.path.realpath, listed(data)))
     for file in held_out:
         if os.path.realpath(file) in fitted:
             raise InputError(
@@ -350,8 +351,9 @@ def held_out_text(
 def _scored(model: Model, recordings: Sequence[Path]) -> Summary:
     """What a model decides of recordings."""
     summary = Summary(model.info.tasks)
+    table_of = cache(read_table)
     for file in recordings:
-        recording = load(file)
+        recording = load(file, table_of=table_of)
         summary.add(recording.labels, decide(model, recording, str(file)), str(file))
     return summary
 

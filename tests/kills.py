@@ -23,7 +23,7 @@ import onnx
 from edge import demo
 from edge.fake.touches import still
 from edge.recording import load
-from edge.saving import change_all, find, save
+from edge.saving import find, listed, save
 from edge.skin import file as skinfile
 from edge.writing import PREFIX
 from tests.bench import tables
@@ -37,6 +37,7 @@ EXPORT = (sys.executable, "-m", "export", "--quick", "--decision-points", "none"
 GOLDEN = Path(__file__).parent / "golden"
 PATIENCE_S = 120.0
 MOST_CHANGES = 4
+COPIES = 12
 CLOSE_S = 0.003
 """Every other kill comes at most so long after one of the first changes of a file."""
 OTHER_MODEL = "is of another model"
@@ -65,11 +66,12 @@ def damage(folder):
     """What is wrong with a folder after a kill; "" if nothing.
 
     Raises:
-        EdgeError: a recording is damaged.
+        EdgeError: a recording or a table of labels is damaged.
     """
-    for path in folder.glob("**/*.npz"):
-        if not path.name.startswith("golden"):
-            load(path)
+    recordings = [p for p in folder.glob("**/*.npz") if not p.name.startswith("golden")]
+    labels = [load(path).labels.get("object") for path in recordings]
+    if 0 < labels.count("crate") < COPIES:
+        return f"{labels.count('crate')} of {COPIES} have the new label"
     if (folder / ROBOT).exists():
         return proven(folder, "")
     complaint = agreeing(folder, "") if (folder / "model.onnx").exists() else ""
@@ -79,7 +81,7 @@ def damage(folder):
 def copied(folder):
     """Fill a folder with the recordings of the demo, over and over."""
     recordings = demo.recordings()
-    for i in range(12):
+    for i in range(COPIES):
         source = recordings[i % len(recordings)]
         shutil.copy(source, folder / f"{source.stem}-{i:02d}.npz")
 
@@ -99,14 +101,27 @@ def relabelled(folder):
     return [*EDGE, "label", "--set", "object=crate", "--yes", folder]
 
 
+def leaving_out(folder):
+    return [*EDGE, "label", "--leave-out", "--yes", folder]
+
+
 def undoing(folder):
     return [*EDGE, "label", "--undo", folder]
 
 
-def all_or_none(folder, printed):
-    """The next start finished the change of labels: all have it."""
-    changed = [load(path).labels["object"] == "crate" for path in find([folder])]
-    return "" if all(changed) else f"{sum(changed)} of {len(changed)} files changed"
+def changed(folder):
+    """How many recordings have the new label."""
+    return sum(load(path).labels["object"] == "crate" for path in listed([folder]))
+
+
+def all_changed(folder, printed):
+    """The next start has changed the labels of all."""
+    return "" if changed(folder) == COPIES else f"{changed(folder)} files changed"
+
+
+def all_left_out(folder, printed):
+    text = (folder / "labels.csv").read_text()
+    return "" if text.count(",yes\n") == COPIES else text
 
 
 def agreeing(folder, printed):
@@ -130,13 +145,12 @@ def exporting(folder):
 
 def before_undo(folder):
     copied(folder)
-    change_all({path: {"object": "crate"} for path in find([folder])})
+    ended(*relabelled(folder))
 
 
 def taken_back(folder, printed):
-    """The next start finished what took the change back: no file has it."""
-    changed = [load(path).labels["object"] == "crate" for path in find([folder])]
-    return f"{sum(changed)} of {len(changed)} files changed" if any(changed) else ""
+    """The change has been taken back, by this start or the next: no file has it."""
+    return f"{changed(folder)} files changed" if changed(folder) else ""
 
 
 def installing(folder):
@@ -208,7 +222,8 @@ def imported(folder, printed):
 
 VICTIMS = {
     "record": Victim(lambda folder: None, recorded, all_recorded),
-    "label --set": Victim(copied, relabelled, all_or_none),
+    "label --set": Victim(copied, relabelled, all_changed),
+    "label --leave-out": Victim(copied, leaving_out, all_left_out),
     "label --undo": Victim(before_undo, undoing, taken_back, refuses=True),
     "install": Victim(before_install, installing, proven),
     "install --back": Victim(before_return, returning, proven),

@@ -14,6 +14,7 @@ import pytest
 from edge import cli
 from edge.chips import block
 from edge.chips.chip import MOST_TAXELS
+from edge.flags import FLAGS
 from edge.model.info import FORMAT
 from export.__main__ import main as export
 from tests.conftest import ROOT, ended
@@ -63,9 +64,51 @@ def test_the_two_evenings_mend_a_mistake(tmp_path):
     environment = {**os.environ, "PATH": path, "PROJECT": str(ROOT)}
     ran = ended("bash", "-e", "-c", script, cwd=tmp_path, env=environment)
     assert ran.returncode == 0, ran.stderr
-    before, *_, after = objects(ran.stdout)
-    assert before != "pillow"
+    # Five touches, with a model of two objects; then one, with a model that knows it.
+    *before, after = objects(ran.stdout)[:6]
+    assert "pillow" not in before
     assert after == "pillow"
+    kept = [json.loads(x) for x in ran.stdout.splitlines() if '"kinds": ["uns' in x]
+    assert len({line["file"] for line in kept if "unlabelled" in line["kinds"]}) == 5
+    assert ran.stderr.count("record a third object") == 2
+
+
+NAMED = re.compile(rf"`({'|'.join(FLAGS)})`|\b(two|three|four|five|\d+) lines of\b")
+CLAIMS = {
+    "evenings: task at least, and so it keeps all": "test_docs.py::test_the_two_evenings",
+    "how-it-decides: is then flagged `out_of_range`": "edge/test_answers.py::test_",
+    "how-it-decides: - **`unusual`**": "export/test_early_stopping.py::test_a_touch_unlike",
+    "how-it-decides: - **`unknown`**": "export/test_early_stopping.py::test_an_unknown",
+    "microcontroller: Without novelty nothing is": "export/test_c_code.py::test_what_does_not",
+    "microcontroller: - **The flags**": "export/test_c_code.py::test_the_demo_has_the_same",
+    "microcontroller: but never flagged `short`": "export/test_c_code.py::test_the_demo_has",
+    "recipes: it prints five lines of pandas": "train/importers/test_csv.py::test_the_lines_of",
+    "recipes: at the full window, flagged `uncer": "export/test_early_stopping.py::test_a_task",
+    "recipes: Otherwise category is flagged": "edge/test_early.py::test_a_product_that_is_not",
+    "recipes: - `unsure` flags a decision that": "export/test_early_stopping.py::test_a_stream",
+    "recipes: `unusual` flags a touch unlike": "export/test_early_stopping.py::test_a_touch_un",
+    "recipes: `unknown` flags a thing that": "export/test_early_stopping.py::test_an_unknown",
+}
+"""Sentences that name a flag or a number of lines, and the test that asserts each. What was
+measured stands in tables of its own."""
+
+
+def test_every_sentence_that_names_a_flag_or_a_number_of_lines_has_a_test():
+    unclaimed = dict(CLAIMS)
+    for page in PAGES:
+        if page.stem in ("formats", "measured", "hard-cases"):
+            continue
+        prose = re.sub(r"```.*?```|^\|.*?$", "", page.read_text(), flags=re.S | re.M)
+        for sentence in re.split(r"(?<=[.:])\s+", prose):
+            text = f"{page.stem}: {' '.join(sentence.split())}"
+            if NAMED.search(text):
+                found = [it for it in CLAIMS if it.partition(": ")[2] in text]
+                assert found, text
+                unclaimed.pop(found[0])
+    assert unclaimed == {}
+    for named in CLAIMS.values():
+        file, _, test = named.partition("::")
+        assert f"def {test}" in (ROOT / "tests" / file).read_text(), named
 
 
 def test_the_notebook_runs(tmp_path):

@@ -46,7 +46,7 @@ def test_a_command_of_any_page_has_arguments_that_its_program_knows(
             program = "-m export"
             words = words[1:]
     try:
-        makers[program]().parse_args(words)
+        cli.parsed(makers[program](), words)
     except SystemExit as end:
         # A sentence may name a command without all of its arguments.
         assert end.code == 0 or "required" in capsys.readouterr().err

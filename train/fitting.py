@@ -10,7 +10,7 @@ import numpy as np
 
 from edge.arrays import Floats
 from edge.errors import InputError
-from edge.tools.slips import slips
+from edge.tools.slips import slips, too_few
 from edge.touch.features import WINDOW_S
 from train.choose.candidates import Candidate
 from train.choose.decision_points import decision_points, has_early_points
@@ -133,7 +133,8 @@ def fit(data: DataSet | str | Path | Sequence[str | Path], **options: Any) -> Fi
     loaded = load(data, fixed)
     y = labels_of_tasks(loaded.dataset, fixed.tasks)
     labels = [trial.labels for trial in loaded.dataset.trials]
-    doubts = [f"warning: probably a slip: {sentence}" for sentence in slips(labels)]
+    places = [str(trial.path) for trial in loaded.dataset.trials]
+    doubts = [f"warning: probably a slip: {text}" for text in slips(labels, places)]
     if len(labels) < FEWEST_TRIALS:
         raise InputError(
             f"a fit needs at least {FEWEST_TRIALS} trials, not {len(labels)}; record more"
@@ -143,7 +144,7 @@ def fit(data: DataSet | str | Path | Sequence[str | Path], **options: Any) -> Fi
     notes = [*doubts, *lacking(loaded.dataset, fixed.tasks), *loaded.notes]
     notes += [*_of_unseen(settings, fixed), *leaks(measured, y)]
     points = decision_points(measured, settings, fixed, notes)
-    notes += settings.notes
+    notes += [*settings.notes, *too_few(labels)]
     if len(points) < 2:
         settings = replace(settings, early=None)
     dataset = measured.of(sorted(settings.features()))

@@ -1,12 +1,14 @@
-"""A hook of MkDocs: pages include measured tables, and the style sheet gets colours of code."""
+"""A hook of MkDocs: pages include measured tables, folded; the style sheet gets colours of code;
+and what scrolls is within reach of the keyboard."""
 
 import re
+import textwrap
 from pathlib import Path
 from typing import Any
 
 from pygments.formatters import HtmlFormatter
 
-TABLE = re.compile(r"^\[[^\]]*\]\((measured/[\w-]+\.md)\)$", re.M)
+TABLE = re.compile(r"^\[([^\]]*)\]\((measured/[\w-]+\.md)\)$", re.M)
 """A line that is nothing but a link to a measured table."""
 
 
@@ -15,9 +17,17 @@ def on_page_markdown(markdown: str, page: Any, config: Any, **_: Any) -> str:
     folder = Path(config["docs_dir"])
 
     def text_of(link: re.Match[str]) -> str:
-        return (folder / link[1]).read_text(encoding="utf-8").strip()
+        text = (folder / link[2]).read_text(encoding="utf-8").strip()
+        return f'??? abstract "{link[1]}"\n\n{textwrap.indent(text, "    ")}'
 
     return TABLE.sub(text_of, markdown)
+
+
+def on_post_page(output: str, **_: Any) -> str:
+    """Let the keyboard reach what may scroll, and call the bar what it is."""
+    bar = '<div role="navigation" aria-label="pages" class="navbar '
+    output = output.replace('<div class="navbar ', bar)
+    return re.sub(r"<(pre|table)\b", r'<\1 tabindex="0"', output)
 
 
 def on_post_build(config: Any, **_: Any) -> None:

@@ -11,7 +11,7 @@ import argparse
 from collections.abc import Iterator
 from dataclasses import asdict
 
-from edge.commands.options import within
+from edge.commands.options import add_file, within
 from edge.commands.output import Output, counted
 from edge.skin.calibration import deaf_taxels
 from edge.skin.decoder import NEVER_STUCK, stuck_limits
@@ -20,12 +20,8 @@ from edge.skin.file import SkinFile, load
 
 def add_options(parser: argparse.ArgumentParser) -> None:
     """Add the command's options."""
-    parser.add_argument(
-        "skin",
-        nargs="?",
-        metavar="skin.toml",
-        help="the file that describes the skin; without it, look at this machine",
-    )
+    text = "the file that describes the skin; without it, look at this machine"
+    add_file(parser, "skin", text)
     parser.add_argument(
         "--overhead",
         type=within(float, 0.0, 10_000.0),

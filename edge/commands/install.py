@@ -14,6 +14,7 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
+from edge.commands.options import add_file
 from edge.commands.output import LOG, Output
 from edge.errors import EdgeError, InputError
 from edge.files import read_bytes, refusing
@@ -34,13 +35,7 @@ LOOK_S = 2.0
 
 def add_options(parser: argparse.ArgumentParser) -> None:
     """Add the command's options."""
-    parser.add_argument(
-        "model",
-        nargs="?",
-        type=Path,
-        metavar="model.onnx",
-        help="the new model",
-    )
+    add_file(parser, "model", "the new model")
     parser.add_argument(
         "--to",
         type=Path,
@@ -52,7 +47,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         type=Path,
         help="its golden.npz (default: that beside the model)",
     )
-    parser.add_argument("--skin", help="skin.toml, which the model must suit")
+    add_file(parser, "skin", "the skin that the model must suit")
     parser.add_argument("--service", help="systemd service to restart, and to watch")
     parser.add_argument(
         "--back",
@@ -79,9 +74,10 @@ def run(arguments: argparse.Namespace) -> int:
         return 0
     if arguments.model is None:
         raise InputError("give the model to install, or --back for the former one")
-    golden = arguments.golden or arguments.model.with_name("golden.npz")
-    prove(arguments.model, golden, arguments.skin)
-    place(arguments.model, golden, target)
+    new = Path(arguments.model)
+    golden = arguments.golden or new.with_name("golden.npz")
+    prove(new, golden, arguments.skin)
+    place(new, golden, target)
     try:
         restart(arguments.service)
     except EdgeError:

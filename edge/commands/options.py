@@ -36,13 +36,29 @@ seconds = within(float, 1e-3, 1e9)
 """The type of an option that takes a duration."""
 
 
+def add_file(
+    parser: argparse.ArgumentParser, name: str, text: str, *, needed: bool = False
+) -> None:
+    """Add the option for a model or a skin, which `edge.cli.dispatch` takes as a bare
+    word too."""
+    suffix = {"model": "onnx", "skin": "toml"}[name]
+    help = f"{text}; may stand without --{name}"
+    parser.add_argument(f"--{name}", metavar=f"{name}.{suffix}", help=help)
+    if needed:
+        parser.set_defaults(needs=name)
+
+
+def apart(words: list[str], *named: str | None) -> tuple[list[str], list[str]]:
+    """The models that options name or that stand among bare words, by their suffix, and
+    the other words."""
+    bare = [word for word in words if word.endswith(".onnx")]
+    others = [word for word in words if word not in bare]
+    return [*filter(None, named), *bare], others
+
+
 def add_skin(parser: argparse.ArgumentParser) -> None:
     """Add the options that name the skin, real or fake; `source.open_skin` opens it."""
-    parser.add_argument(
-        "--skin",
-        metavar="skin.toml",
-        help="the file that describes the skin",
-    )
+    add_file(parser, "skin", "the file that describes the skin")
     parser.add_argument(
         "--fake",
         metavar="REC.npz",

@@ -17,6 +17,7 @@ from edge.classifier import Classifier
 from edge.commands.options import (
     add_engine,
     add_error,
+    add_file,
     add_reading,
     check_error,
     within,
@@ -32,7 +33,7 @@ from edge.touch.track import MAX_CONTACTS
 
 def add_options(parser: argparse.ArgumentParser) -> None:
     """Add the command's options."""
-    parser.add_argument("--model", required=True, help="model.onnx")
+    add_file(parser, "model", "the model that decides", needed=True)
     add_engine(parser)
     add_error(parser)
     add_reading(parser)

@@ -8,7 +8,7 @@ The exit status is 1 if a result differs.
 import argparse
 from dataclasses import asdict
 
-from edge.commands.options import add_engine
+from edge.commands.options import add_engine, add_file
 from edge.commands.output import LOG, Output
 from edge.model.model import Model
 from edge.model.verify import golden_of, verify
@@ -16,7 +16,7 @@ from edge.model.verify import golden_of, verify
 
 def add_options(parser: argparse.ArgumentParser) -> None:
     """Add the command's options."""
-    parser.add_argument("--model", required=True, help="model.onnx")
+    add_file(parser, "model", "the model to check", needed=True)
     parser.add_argument(
         "--golden",
         help="golden.npz, written together with the model (default: that which `install` "

@@ -35,7 +35,8 @@ from edge.arrays import Array, Floats, Integers
 from edge.errors import InputError
 from edge.files import parsing
 from edge.model.model import Model
-from edge.recording import Recording, load_arrays, load_meta
+from edge.npz import load_arrays, load_meta
+from edge.recording import Recording
 from edge.touch.contact import FeatureSeries
 from edge.touch.feature import OF_CELLS
 from edge.touch.first_contact import first_contact

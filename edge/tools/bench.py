@@ -23,6 +23,7 @@ import numpy as np
 
 from edge import __version__
 from edge.classifier import Classifier
+from edge.commands.options import add_file
 from edge.commands.output import Output
 from edge.errors import InputError
 from edge.model.model import Model
@@ -44,7 +45,7 @@ Timings = dict[str, float | int]
 
 def add_options(parser: argparse.ArgumentParser) -> None:
     """Add the command's options."""
-    parser.add_argument("--model", required=True, help="model.onnx")
+    add_file(parser, "model", "the model to time", needed=True)
     parser.add_argument(
         "--out",
         required=True,

@@ -2,7 +2,7 @@
 
 Prints the training trials nearest to a touch, and in which features it is more like the
 nearest trial with the answer, or more like the nearest one with another label, the
-strongest first. `python -m train show REC --model model.onnx` draws the curves.
+strongest first. `edge-classify show REC --model model.onnx` draws the curves.
 """
 
 import argparse
@@ -12,6 +12,7 @@ from typing import Any, NamedTuple, Self
 import numpy as np
 
 from edge.arrays import Array, Booleans, Floats, Integers
+from edge.commands.options import add_file, apart
 from edge.commands.output import Output, counted
 from edge.commands.texts import wrapped
 from edge.errors import InputError
@@ -225,21 +226,17 @@ class _Touch:
 
 def add_options(parser: argparse.ArgumentParser) -> None:
     """Add the command's options."""
-    parser.add_argument("--model", metavar="model.onnx", help="or the first file")
-    parser.add_argument(
-        "files",
-        nargs="+",
-        metavar="REC",
-        help=".npz files or folders; without --model, the model stands before them",
-    )
+    add_file(parser, "model", "the model to explain")
+    help = ".npz files or folders"
+    parser.add_argument("recordings", nargs="+", metavar="REC", help=help)
 
 
 def run(arguments: argparse.Namespace) -> int:
     """Print an explanation for each recording and task."""
-    recordings = arguments.files
-    model = Model(arguments.model or recordings.pop(0))
-    if not recordings:
-        raise InputError("name the recordings to explain after the model")
+    models, recordings = apart(arguments.recordings, arguments.model)
+    if len(models) != 1 or not recordings:
+        raise InputError("give one model.onnx, and the recordings to explain")
+    model = Model(models[0])
     output = Output.of(arguments)
     for path in find(recordings):
         if not output.as_json:

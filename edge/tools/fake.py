@@ -9,7 +9,7 @@ fitted to them knows nothing about the real skin.
 import argparse
 from pathlib import Path
 
-from edge.commands.options import within
+from edge.commands.options import add_file, within
 from edge.commands.output import Output
 from edge.fake.touches import still, touches
 from edge.saving import save
@@ -23,12 +23,7 @@ STILL_S = 5.0
 
 def add_options(parser: argparse.ArgumentParser) -> None:
     """Add the command's options."""
-    parser.add_argument(
-        "--skin",
-        required=True,
-        metavar="skin.toml",
-        help="the file that describes the skin",
-    )
+    add_file(parser, "skin", "the file that describes the skin", needed=True)
     parser.add_argument(
         "--out", type=Path, required=True, metavar="DIR", help="the folder to write to"
     )

@@ -10,6 +10,7 @@ import json
 from collections.abc import Iterator, Mapping
 from typing import Any
 
+from edge.commands.options import add_file
 from edge.commands.output import Output, counted
 from edge.commands.texts import wrapped
 from edge.model.info import ModelInfo, Stopping
@@ -32,10 +33,7 @@ UNDOUBTED = "It names every touch without a doubt, also those of things it has n
 
 def add_options(parser: argparse.ArgumentParser) -> None:
     """Add the command's options."""
-    model = parser.add_mutually_exclusive_group(required=True)
-    name = "model.onnx"
-    model.add_argument("model", nargs="?", default=argparse.SUPPRESS, metavar=name)
-    model.add_argument("--model", metavar=name, help="the same, as for other commands")
+    add_file(parser, "model", "the model to describe", needed=True)
 
 
 def run(arguments: argparse.Namespace) -> int:

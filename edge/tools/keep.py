@@ -13,9 +13,11 @@ from edge.commands.output import LOG, counted
 from edge.commands.source import Opened
 from edge.errors import EdgeError, InputError
 from edge.events import Decided, Event
+from edge.labels import read_table
 from edge.model.info import ModelInfo
-from edge.recording import load_arrays, load_meta
-from edge.saving import alone, save
+from edge.recording import read_meta
+from edge.saving import save
+from edge.tools.changes import alone
 from edge.tools.record import Trials, recording, shared_meta
 from edge.tools.review import decisions_of, is_unsure
 from edge.touch.frame import Frame
@@ -160,20 +162,19 @@ class Keeper:
         if excess <= 0:
             return
         # Who changes labels here keeps all; the next touch makes room.
-        with suppress(InputError), alone([self._folder]):
+        with suppress(InputError), alone(self._folder):
+            rows = read_table(self._folder).rows
             for file, size in sizes.items():
-                if excess > 0 and not is_labelled(file):
+                if excess > 0 and file.name not in rows and not is_labelled(file):
                     with suppress(OSError):
                         file.unlink()
                         excess -= size
 
 
 def is_labelled(file: Path) -> bool:
-    """Whether a recording has a label; one that cannot be read may have one."""
+    """Whether a recording was labelled; one that cannot be read may have been."""
     with suppress(InputError):
-        return bool(
-            load_meta(str(file), load_arrays(file, keys=("meta",))).get("labels")
-        )
+        return bool(read_meta(file)["labels"])
     return True
 
 

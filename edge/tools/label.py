@@ -1,25 +1,33 @@
 """List the labels of recordings, or change them.
 
-Without --set, --unset, --accept and --delete, prints each recording's labels and
-decisions, how many recordings have each label, and which are probably slips. With
-them, shows what would change, and with --yes writes the changed recordings anew, each
-whole or not at all, if all of them can be read. --undo takes the last change back. The next
-`make export` trains on the new labels.
+Prints each recording's labels and decisions, how many recordings have each label, and
+which are probably slips. With --set, --unset, --accept, --leave-out or --put-back, shows
+what would change, and with --yes writes it into labels.csv beside the recordings, which
+wins over their own labels. Recordings stay as they are. --undo takes the last change
+back, ten times. The next `make export` trains on the new labels.
 """
 
 import argparse
-from collections.abc import Mapping, Sequence
+import os
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from functools import cache
 from pathlib import Path
 from typing import Any
 
 from edge.commands.output import Output, counted
 from edge.commands.texts import labels_text
 from edge.errors import InputError
-from edge.recording import Recording, load
-from edge.saving import alone, change_all, find, take_back
+from edge.labels import Standing, Table, read_table
+from edge.recording import read_meta
+from edge.saving import listed, warn_of_remains
 from edge.tools import review
+from edge.tools.changes import FORMER, Change, Former, change, formers, now, undo
+from edge.tools.review import Touch
 from edge.tools.slips import counts_text, slips
 from edge.tools.trial_options import task_label
+
+CHANGES = ("set", "unset", "accept", "leave_out", "put_back", "rows")
+"""Options that change something."""
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
@@ -47,8 +55,8 @@ def add_options(parser: argparse.ArgumentParser) -> None:
             "--only",
             "WHICH",
             str,
-            "only recordings that are unsure, wrong or unlabelled, or that have a "
-            "task; repeat it for recordings that are all of these",
+            "only recordings that are unsure, wrong, unlabelled or left_out, that have a "
+            "task, or a label (object=cupp); repeat it for those that are all of these",
         ),
     ):
         parser.add_argument(
@@ -61,9 +69,11 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         )
     for option, text in {
         "--accept": "label kept touches as they were decided, in tasks without a label",
-        "--delete": "delete the recordings",
+        "--leave-out": "leave the recordings out of whatever reads the folder",
+        "--put-back": "take recordings in again that were left out",
+        "--rows": "give each recording its row, to go on in a spreadsheet",
         "--undo": "take the last change in a folder back",
-        "--yes": "change the recordings, which else are only shown",
+        "--yes": "change the labels, which else are only shown",
     }.items():
         parser.add_argument(option, action="store_true", help=text)
 
@@ -72,89 +82,111 @@ def run(arguments: argparse.Namespace) -> int:
     """Print the labels, or change those that are to be changed."""
     output = Output.of(arguments)
     if arguments.undo:
-        return undo(arguments.data, output)
+        return _undo(arguments.data, output)
     tasks = {*arguments.unset, *dict(arguments.set)}
     if len(tasks) < len(arguments.unset + arguments.set):
         raise InputError("--set and --unset name a task twice; name it once")
-    paths = find(arguments.data)
-    changes = any((arguments.accept, arguments.set, arguments.unset, arguments.delete))
-    # Nobody else changes what is changed here, from its reading on.
-    with alone(path.parent for path in paths if changes):
-        recordings = []
-        for path in paths:
-            recording = load(path)
-            if review.selected(recording.meta, arguments.only):
-                recordings.append((path, recording))
-        if not recordings:
-            output.text(f"none of {counted(len(paths), 'recording')} is of this kind")
-            return 1
-        if changes:
-            return _change(arguments, output, recordings)
-        _print(output, recordings)
-        return 0
+    table_of = cache(read_table)
+    paths = listed(arguments.data)
+    warn_of_remains(paths, table_of)
+    touches = read(paths, table_of)
+    selected = review.selected(touches, arguments.only)
+    if not selected:
+        output.text(f"none of {counted(len(touches), 'recording')} is of this kind")
+        return 1
+    if any(map(vars(arguments).get, CHANGES)):
+        return _change(arguments, output, selected)
+    _print(output, selected)
+    return 0
+
+
+def read(paths: Iterable[Path], table_of: Callable[[Path], Table]) -> list[Touch]:
+    """The recordings of some files."""
+    return review.touches({path: read_meta(path) for path in paths}, table_of)
 
 
 def _change(
     arguments: argparse.Namespace,
     output: Output,
-    recordings: Sequence[tuple[Path, Recording]],
+    touches: Sequence[Touch],
 ) -> int:
-    """Show what becomes of recordings, and change them.
+    """Show what becomes of recordings, and change their labels.
 
     Raises:
-        InputError: --yes is missing.
+        InputError: --yes is missing, or a recording has been changed meanwhile.
     """
-    changes: dict[Path, dict[str, str] | None] = {}
-    for path, recording in recordings:
-        after = None
-        if not arguments.delete:
-            after = changed(
-                str(path),
-                recording.meta,
-                dict(arguments.set),
-                arguments.unset,
-                accepts=arguments.accept,
-            )
-        if recording.labels != after:
-            changes[path] = after
-            becomes = "is deleted" if after is None else f"becomes {_text(after)}"
-            output.text(f"{path}: {_text(recording.labels)} {becomes}")
-    if not changes:
-        output.text(f"none of {counted(len(recordings), 'recording')} would change")
+    by_folder = _shown(arguments, output, touches)
+    if not by_folder:
+        output.text(f"none of {counted(len(touches), 'recording')} would change")
         return 0
-    number = counted(len(changes), "recording")
+    number = counted(sum(map(len, by_folder.values())), "recording")
     if not arguments.yes:
         raise InputError(f"{number} would change, as shown; add --yes to do it")
-    change_all(changes)
-    if arguments.delete:
-        output.text(f"{number} deleted; --undo brings them back")
-    else:
-        _print(output, [(path, load(path)) for path, _ in recordings])
+    when = now()
+    tables = {}
+    for folder, changes in by_folder.items():
+        tables[folder] = change(folder, changes, when, arguments.command)
+    paths = [folder / file for folder in by_folder for file in by_folder[folder]]
+    _print(output, read(paths, tables.__getitem__))
     return 0
 
 
-def undo(data: Sequence[str], output: Output) -> int:
-    """Take the last change of labels, or the last deletion, in some folders back.
+def _shown(
+    arguments: argparse.Namespace, output: Output, touches: Sequence[Touch]
+) -> dict[Path, dict[str, Change]]:
+    """{folder: {file: what changes}}, which is shown."""
+    by_folder: dict[Path, dict[str, Change]] = {}
+    for touch in touches:
+        path = touch.path
+        before = touch.standing
+        after = _after(arguments, touch)
+        if after != before:
+            output.text(f"{path}: {_text(before)} becomes {_text(after)}")
+        if after != before or (arguments.rows and touch.place == str(path)):
+            by_folder.setdefault(path.parent, {})[path.name] = Change(before, after)
+    return by_folder
+
+
+def _after(arguments: argparse.Namespace, touch: Touch) -> Standing:
+    """How a recording stands after the change."""
+    labels = changed(
+        touch.meta,
+        touch.standing.labels,
+        dict(arguments.set),
+        arguments.unset,
+        accepts=arguments.accept,
+    )
+    left_out = touch.standing.left_out or arguments.leave_out
+    return Standing(labels, left_out and not arguments.put_back)
+
+
+def _undo(data: Sequence[str], output: Output) -> int:
+    """Take the last change back, in all the folders in which it was made.
 
     Raises:
         InputError: there is nothing to take back, or no such folder.
     """
-    folders = sorted({Path(name) for name in data})
-    for folder in folders:
-        if not folder.is_dir():
-            raise InputError(f"{folder}: --undo takes the folder of the recordings")
-    with alone(folders):
-        paths = take_back(folders)
-    if not paths:
-        where = ", ".join(map(str, folders))
-        raise InputError(f"{where}: there is no change to take back")
-    for path in paths:
-        output.text(f"{path}: is as it was before")
+    last: list[Former] = []
+    for name in data:
+        if not os.path.isdir(name):
+            raise InputError(f"{name}: --undo takes the folder of the recordings")
+        for place in Path(name).rglob(FORMER):
+            last += formers(place.parent)[-1:]
+    if not last:
+        raise InputError(f"{', '.join(data)}: there is no change to take back")
+    latest = max(former.time for former in last)
+    for former in last:
+        if former.time == latest:
+            folder = undo(former)
+            output.text(
+                f"{folder}: is as before `{former.command}` of {latest[:19]} UTC"
+            )
     return 0
 
 
-def _text(labels: Mapping[str, str]) -> str:
-    return labels_text(labels, " ") or "no label"
+def _text(standing: Standing) -> str:
+    labels = labels_text(standing.labels, " ") or "no label"
+    return f"{labels} (left out)" if standing.left_out else labels
 
 
 def _decided_text(decided: Mapping[str, Mapping[str, Any]]) -> str:
@@ -168,32 +200,34 @@ def _decided_text(decided: Mapping[str, Mapping[str, Any]]) -> str:
     return "; ".join(answers)
 
 
-def _print(output: Output, recordings: Sequence[tuple[Path, Recording]]) -> None:
+def _print(output: Output, touches: Sequence[Touch]) -> None:
     """Print each recording's labels, how many have each label, and probable slips."""
-    width = max(len(str(path)) for path, _ in recordings)
-    labels = [recording.labels for _, recording in recordings]
-    for path, recording in recordings:
-        decided = review.decisions(recording.meta)
+    width = max(len(str(touch.path)) for touch in touches)
+    for touch in touches:
+        path, meta, standing, _ = touch
+        decided = review.decisions(meta)
         event: dict[str, Any] = {
             "event": "labels",
             "file": str(path),
-            "labels": recording.labels,
-            "kinds": review.kinds(recording.meta),
+            "labels": standing.labels,
+            "kinds": touch.kinds,
         }
-        text = f"{path!s:<{width}}  {_text(recording.labels)}"
+        text = f"{path!s:<{width}}  {_text(standing)}"
         if decided:
             event["decided"] = decided
             text += f" (decided: {_decided_text(decided)})"
         output.event(event, text)
+    in_use = [touch for touch in touches if not touch.standing.left_out]
+    labels = [touch.standing.labels for touch in in_use]
     for sentence in counts_text(labels):
         output.text(sentence)
-    for sentence in slips(labels):
+    for sentence in slips(labels, [touch.place for touch in in_use]):
         output.text(f"probably a slip: {sentence}")
 
 
 def changed(
-    name: str,
     meta: Mapping[str, Any],
+    before: Mapping[str, str],
     labels: Mapping[str, str],
     without: Sequence[str] = (),
     *,
@@ -202,23 +236,13 @@ def changed(
     """A recording's labels after a change.
 
     Args:
-        name: of the recording.
         meta: its metadata.
+        before: its labels before.
         labels: {task: its new label}.
         without: tasks whose label is taken away.
         accepts: the other tasks that lack a label get that of their decision.
-
-    Raises:
-        InputError: its contacts have their own labels.
     """
-    before = meta.get("labels", {})
     after = {**before, **labels}
     if accepts:
-        after |= review.accepted({**meta, "labels": after})
-    for task in without:
-        after.pop(task, None)
-    if meta.get("contacts") and after != before:
-        raise InputError(
-            f"{name}: its contacts have labels of their own; change meta.contacts"
-        )
-    return after
+        after |= review.accepted(meta, after)
+    return {task: label for task, label in after.items() if task not in without}

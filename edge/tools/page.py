@@ -5,9 +5,11 @@ import logging
 import math
 import os
 import tempfile
-from collections import deque
+from collections import Counter, deque
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from functools import cache
+from itertools import starmap
 from pathlib import Path
 from typing import Any
 
@@ -15,12 +17,15 @@ import numpy as np
 
 from edge.errors import InputError
 from edge.events import Decided, Event, Onset
-from edge.recording import Recording, load
-from edge.saving import alone, change_all, finish_interrupted, take_back
+from edge.files import parsing
+from edge.labels import Standing, read_table
+from edge.recording import load, read_meta
 from edge.skin.loop import Schedule
 from edge.tools import review
+from edge.tools.changes import Change, Former, change, formers, now, undo
 from edge.tools.label import changed
-from edge.tools.slips import doubts
+from edge.tools.review import Touch
+from edge.tools.slips import doubts, too_few
 from edge.tools.web import WebServer
 from edge.touch.contact import Contact
 from edge.touch.frame import Frame
@@ -32,7 +37,8 @@ Json = dict[str, Any]
 LOG = logging.getLogger(__name__)
 PICTURE_S = 0.1
 """Between two pictures."""
-LAST_TRIALS = 200
+SHOWN = 50
+"""Touches that the list shows at a time."""
 LAST_NOTICES = 8
 CURVE_S = 5.0
 """Of a contact, the page draws so many seconds from its onset."""
@@ -55,7 +61,7 @@ class Page:
         *,
         title: str,
         folder: Path | None = None,
-        labels: dict[str, str] | None = None,
+        labels: Mapping[str, str | None] | None = None,
         choices: Mapping[str, Sequence[str]] | None = None,
         decides: bool = False,
     ) -> None:
@@ -66,8 +72,8 @@ class Page:
             layout: the skin, with its thresholds.
             title: names the skin.
             folder: of the trials that are recorded or kept; None if none are.
-            labels: of the first trials; without any, recording waits for a person to
-                give some.
+            labels: of the first trials; without any, or where one is None, recording
+                waits for a person to give it.
             choices: {task: the labels that it can have}, which the page offers as
                 buttons.
             decides: a model decides on the contacts, so that none are recorded.
@@ -77,14 +83,17 @@ class Page:
                 read.
         """
         self._folder = folder
-        self.labels = dict(labels or {})
-        self.recording = bool(self.labels)
-        self._trials: dict[str, Json] = {}
+        given = dict(labels or {})
+        self.labels = {task: label for task, label in given.items() if label}
+        self._waits = given.keys() - self.labels.keys()
+        self.recording = bool(self.labels) and not self._waits
+        self._touches: dict[str, Touch] = {}
+        """Those of the folder by file, the newest first."""
+        self._courses: dict[str, Json] = {}
+        """The seconds and the curve of touches that have been shown."""
         self._notices: deque[str] = deque(maxlen=LAST_NOTICES)
         self._version = 0
-        """Number of changes of the list of trials, and of the labels."""
-        self._undo: list[str] = []
-        """The files that the last action changed or deleted."""
+        """Number of changes of the list or of the labels that this program has made."""
         self.look()
         self._tracker = ContactTracker(layout, horizon_s=CURVE_S)
         self._contact: Contact | None = None
@@ -133,9 +142,9 @@ class Page:
             "decisions": list(self._decisions.values()),
             "labels": dict(self.labels),
             "recording": self.recording,
+            "waits": sorted(self._waits),
             "trials": self._version,
             "notices": list(self._notices),
-            "undo": self._undo,
         }
         if frame.shear is not None:
             picture["shear"] = frame.shear.reshape(-1, 2).tolist()
@@ -148,26 +157,14 @@ class Page:
         """Show a sentence, such as the state of a chip."""
         self._notices.append(text)
 
-    def saved(self, path: Path, trial: Recording) -> None:
-        """Add a trial that has been recorded."""
-        self._trials[path.name] = {
-            "labels": trial.labels,
-            "seconds": round(float(np.ptp(trial.t)), 2),
-            "curve": review.curve(trial),
-            "decided": review.decisions(trial.meta),
-            "accepted": review.accepted(trial.meta),
-            "kinds": review.kinds(trial.meta),
-        }
+    def saved(self) -> None:
+        """Show that a touch has been recorded."""
         self._version += 1
 
-    def _show_trial(self, path: Path) -> None:
-        """Add a trial of the folder; a damaged one is named and left out."""
-        try:
-            self.saved(path, load(path))
-        except InputError as error:
-            sentence = f"{error}; the list skips it"
-            if sentence not in self._notices:
-                self.notice(sentence)
+    def left_out(self, paths: Sequence[Path]) -> int:
+        """How many of these recordings are left out."""
+        touches = [self._touches.get(path.name) for path in paths]
+        return sum(it is not None and it.standing.left_out for it in touches)
 
     def _curves(self) -> Json | None:
         """The last contact: its taxels, and its features since onset."""
@@ -189,36 +186,46 @@ class Page:
         }
 
     def look(self) -> None:
-        """Add the touches that have come into the folder, and leave out those that have
-        gone."""
+        """Take in the touches that have come into the folder, those that have gone, and
+        the labels that have changed; what cannot be read is named once."""
         if self._folder is None:
             return
-        finish_interrupted([self._folder])
-        paths = sorted(self._folder.glob("[!.]*.npz"))[-LAST_TRIALS:]
-        present = {path.name for path in paths}
-        for name in set(self._trials) - present:
-            del self._trials[name]
-            self._version += 1
-        for path in paths:
-            if path.name not in self._trials:
-                self._show_trial(path)
+        known = {touch.path: touch.meta for touch in self._touches.values()}
+        metas = {}
+        for path in sorted(self._folder.glob("[!.]*.npz")):
+            with self._naming("; the list skips it"):
+                metas[path] = known.get(path) or read_meta(path)
+        with self._naming():
+            touches = review.touches(metas, cache(read_table))
+            touches.sort(key=lambda touch: touch.path.stat().st_mtime_ns)
+            self._touches = {touch.path.name: touch for touch in reversed(touches)}
+
+    @contextmanager
+    def _naming(self, then: str = "") -> Iterator[None]:
+        """Say once what cannot be read."""
+        try:
+            yield
+        except (InputError, OSError) as error:
+            if f"{error}{then}" not in self._notices:
+                self.notice(f"{error}{then}")
 
     def _act(self, action: Json) -> Json | None:
-        """Carry out an action of the page; the list of trials where it asks for it, with
-        what is doubtful about their labels and about those of the next one.
+        """Carry out an action of the page; the list of touches where it asks for it.
 
         Raises:
-            InputError: it is none, it is not possible here, or a trial cannot be read.
+            InputError: it is none, it is not possible here, or a touch cannot be read.
         """
         kind = action.get("do")
         if self._folder is None:
             raise InputError("this page records nothing; start it with `record --web`")
         if kind == "trials":
-            if self._fixed["decides"]:
-                self.look()
-            return self._list()
+            self.look()
+            return self._list(self._folder, action)
         if kind == "labels":
             self.labels = {**self.labels, **_labels(action)}
+            if self._waits and self._waits <= self.labels.keys():
+                self._waits.clear()
+                self.recording = True
         elif kind == "unlabel":
             labels = dict(self.labels)
             labels.pop(str(action.get("task")), None)
@@ -227,20 +234,58 @@ class Page:
         elif kind == "record":
             self._switch(bool(action.get("on")))
         elif kind == "undo":
-            self._take_back(self._folder)
-        elif kind in ("relabel", "accept", "delete"):
+            self._take_back(self._folder, action)
+        elif kind in ("relabel", "accept", "leave_out", "put_back"):
             self._change(self._folder, action)
         else:
             raise InputError(f"{kind!r} is no action")
         self._version += 1
         return None
 
-    def _list(self) -> Json:
-        """The trials and the labels of the next one, with what is doubtful about each."""
-        # Another thread adds to the trials.
-        trials = [{"file": file, **trial} for file, trial in list(self._trials.items())]
-        labels = (trial["labels"] for trial in trials)
-        return {"trials": trials, "doubts": doubts([*labels, self.labels])}
+    def _list(self, folder: Path, action: Json) -> Json:
+        """Some touches of those that a word selects, how many these are, the words with
+        the number of their touches, and what is doubtful about the next one's labels."""
+        touches = list(self._touches.values())
+        labels = [touch.standing.labels for touch in touches]
+        doubtful = doubts([*labels, self.labels])
+        words: Counter[str] = Counter()
+        rows = []
+        for touch, sentences in zip(touches, doubtful, strict=False):
+            words.update(touch.words)
+            if action.get("only", "") in ("", *touch.words):
+                rows.append((touch, sentences))
+        start = str(action.get("start", 0))
+        first = int(start) if start.isdecimal() else 0
+        last: list[Former] = []
+        with self._naming():
+            last = formers(folder)[-1:]
+        return {
+            "trials": list(starmap(self._row, rows[first : first + SHOWN])),
+            "total": len(rows),
+            "all": len(touches),
+            "words": sorted(words.items()),
+            "doubts": doubtful[-1] + too_few(labels),
+            "undo": [{"time": it.time, "command": it.command} for it in last],
+        }
+
+    def _row(self, touch: Touch, sentences: Sequence[str]) -> Json:
+        """What the list says of a touch, with what is doubtful about its labels."""
+        file = touch.path.name
+        if file not in self._courses:
+            self._courses[file] = {"seconds": 0.0, "curve": []}
+            with self._naming():
+                trial = load(touch.path)
+                seconds = round(float(np.ptp(trial.t)), 2)
+                self._courses[file] = {"seconds": seconds, "curve": review.curve(trial)}
+        return {
+            "file": file,
+            **touch.standing._asdict(),
+            **self._courses[file],
+            "decided": review.decisions(touch.meta),
+            "accepted": review.accepted(touch.meta, touch.standing.labels),
+            "kinds": touch.kinds,
+            "doubts": sentences,
+        }
 
     def _switch(self, on: bool) -> None:
         """Begin or stop saving trials.
@@ -248,45 +293,52 @@ class Page:
         Raises:
             InputError: they would have no label.
         """
-        if on and not self.labels:
-            raise InputError("give a label first; a trial without one teaches nothing")
+        if on and (self._waits or not self.labels):
+            what = " and ".join(sorted(self._waits)) or "a label"
+            raise InputError(f"give {what} first; a trial without one teaches nothing")
         self.recording = on
 
     def _change(self, folder: Path, action: Json) -> None:
-        """Label or delete trials, so that it can be taken back.
+        """Label touches, leave them out, or put them back.
 
         Raises:
-            InputError: the page does not show all of them, one cannot be read or
-                written, or the labels are no names.
+            InputError: one does not stand any more as the browser showed it, or is none
+                of this page's, or the labels are no names.
         """
-        files = action.get("files") or [None]
-        if not set(self._trials).issuperset(files):
-            raise InputError(f"{files} are none of the trials that this page shows")
-        with alone([folder]):
-            paths = [folder / name for name in files]
-            changes: dict[Path, dict[str, str] | None] = dict.fromkeys(paths)
-            if action["do"] != "delete":
-                accepts = action["do"] == "accept"
-                labels = {} if accepts else _labels(action)
-                for path in paths:
-                    meta = load(path).meta
-                    changes[path] = changed(str(path), meta, labels, accepts=accepts)
-            change_all(changes)
-            for path, after in changes.items():
-                if after is None:
-                    del self._trials[path.name]
-                else:
-                    self._show_trial(path)
-        self._undo = files
+        kind = action["do"]
+        labels = _labels(action) if kind == "relabel" else {}
+        changes = {}
+        for file, before in _seen(action).items():
+            if file not in self._touches:
+                raise InputError(f"{file!r} is none of the touches of this page")
+            meta = self._touches[file].meta
+            after = Standing(
+                changed(meta, before.labels, labels, accepts=kind == "accept"),
+                before.left_out
+                if kind in ("relabel", "accept")
+                else kind == "leave_out",
+            )
+            changes[file] = Change(before, after)
+        what = next(iter(changes)) if len(changes) == 1 else f"{len(changes)} touches"
+        words = [kind.replace("_", " "), what, *map("=".join, labels.items())]
+        try:
+            change(folder, changes, now(), " ".join(words))
+        finally:
+            self.look()
 
-    def _take_back(self, folder: Path) -> None:
-        """Bring back what the last action changed or deleted."""
-        if not self._undo:
-            raise InputError("there is nothing to undo")
-        with alone([folder]):
-            for path in take_back([folder]):
-                self._show_trial(path)
-        self._undo = []
+    def _take_back(self, folder: Path, action: Json) -> None:
+        """Take the last change of labels back, if it is the one that the browser shows.
+
+        Raises:
+            InputError: it is another one, or there is none.
+        """
+        last = formers(folder)[-1:]
+        try:
+            if not last or last[0].time != action.get("time"):
+                raise InputError("the labels have been changed since; look again")
+            undo(last[0])
+        finally:
+            self.look()
 
 
 def _decision(event: Decided) -> Json:
@@ -295,6 +347,17 @@ def _decision(event: Decided) -> Json:
     distances = [] if decision is None else decision.distances.round(3).tolist()
     neighbours = list(zip(event.nearest, distances, strict=True))
     return {**event.to_dict(), "neighbours": neighbours}
+
+
+def _seen(action: Json) -> dict[str, Standing]:
+    """{file: how it stands} of the touches of an action, as the browser shows them.
+
+    Raises:
+        InputError: it names none.
+    """
+    with parsing("the action", "one of this page", "; load it again"):
+        touches = action["touches"]
+        return {it["file"]: Standing(it["labels"], it["left_out"]) for it in touches}
 
 
 def _labels(action: Json) -> dict[str, str]:

@@ -13,7 +13,7 @@ import math
 import os
 import re
 from collections import deque
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import closing, suppress
 from dataclasses import dataclass, field
 from itertools import count
@@ -24,16 +24,17 @@ import numpy as np
 
 from edge.arrays import Array, Floats
 from edge.classifier import Classifier
-from edge.commands.options import add_reading, within
+from edge.commands.options import add_file, add_reading, within
 from edge.commands.output import LOG
 from edge.commands.source import Opened, reading
 from edge.errors import InputError
 from edge.events import Decided, Event
 from edge.files import refusing
+from edge.labels import Row, read_table
 from edge.model.model import Model
 from edge.output.event_writer import Lines
 from edge.recording import Recording
-from edge.saving import DELETED, save
+from edge.saving import save
 from edge.skin import file as skinfile
 from edge.skin.skin import Skin
 from edge.tools.review import decisions_of
@@ -75,11 +76,8 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         metavar="FOLDER",
         help="a folder for numbered trials (default: %(default)s)",
     )
-    parser.add_argument(
-        "--model",
-        help="model.onnx, whose decisions are shown beside the labels and kept in each "
-        "trial",
-    )
+    text = "a model, whose decisions are shown beside the labels and kept in each trial"
+    add_file(parser, "model", text)
     parser.add_argument(
         "--trials",
         type=within(int, 1, 1e9),
@@ -189,14 +187,16 @@ def trial_path(folder: Path, labels: dict[str, str]) -> Path:
     # Searches of a folder omit names that begin with a dot.
     plain = re.sub(r"[^\w.-]+", "_", "-".join(labels.values())).lstrip(".")
     stem = plain[:LONGEST_STEM] or "trial"
-    # A deleted trial may come back under its name.
-    folders = (folder, folder / DELETED)
+    rows: Mapping[str, Row] = {}
+    with suppress(InputError):  # a touch is worth more than a damaged table
+        rows = read_table(folder).rows
     names = (f"{stem}-{number:03}.npz" for number in count(1))
     with refusing(f"{folder}: cannot be written"):  # a name of 300 characters, for one
         return next(
             folder / name
             for name in names
-            if not any(os.path.lexists(place / name) for place in folders)
+            # What a row says of a trial that is gone is not true of the next one.
+            if name not in rows and not os.path.lexists(folder / name)
         )
 
 
@@ -225,7 +225,7 @@ def run(arguments: argparse.Namespace) -> int:
         wire_s = round(1.0 / frame_rate(live.skin.file), 6)
         recorder = Recorder(
             arguments.out,
-            labels,
+            {task: label for task, label in labels.items() if label},
             {**shared_meta(live.opened, arm), "wire_s": wire_s},
             _joint_names(arguments, live.opened, arm),
             lines,
@@ -264,22 +264,22 @@ def _arm(arguments: argparse.Namespace, model: Model | None) -> Chain | None:
     return arm
 
 
-def _labels(arguments: argparse.Namespace) -> dict[str, str]:
-    """{task: label} of the first trial.
+def _labels(arguments: argparse.Namespace) -> dict[str, str | None]:
+    """{task: label} of the first trial; None where a person is to choose one.
 
     Raises:
         InputError: there is none, and none can be given later; or a task has two.
     """
-    labels: dict[str, str] = {}
+    labels: dict[str, str | None] = {}
     for task, label in arguments.label:
-        labels.setdefault(task, label)
+        labels[task] = None if task in labels else label
     if arguments.web is not None:
         return labels
     if not labels:
         raise InputError(
             "give --label TASK=LABEL; a trial without a label teaches nothing"
         )
-    if len(labels) < len(arguments.label):
+    if None in labels.values():
         raise InputError(
             "--label names a task twice; only on the page, with --web, does a person "
             "choose the label"
@@ -371,8 +371,10 @@ class Recorder:
 
     @property
     def count(self) -> int:
-        """Trials that have been saved and are still there."""
-        return sum(path.exists() for path in self.paths)
+        """Trials that have been saved, are still there, and are not left out on the
+        page."""
+        paths = [path for path in self.paths if path.exists()]
+        return len(paths) - (0 if self.page is None else self.page.left_out(paths))
 
     def follow(self, trials: Trials, events: Sequence[Event] = ()) -> None:
         """Take over the page's labels, and the decisions about the touch under way,
@@ -435,4 +437,4 @@ class Recorder:
             )
         self.lines.write([event])
         if self.page is not None:
-            self.page.saved(path, trial)
+            self.page.saved()

@@ -9,13 +9,15 @@ from __future__ import annotations
 import argparse
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
+from functools import cache
 from pathlib import Path
 from typing import Any
 
 from edge.classifier import Classifier, suited
-from edge.commands.options import add_engine, add_error, check_error
+from edge.commands.options import add_engine, add_error, apart, check_error
 from edge.commands.output import LOG, Output, counted
 from edge.errors import InputError, about, printable
+from edge.labels import read_table
 from edge.model.info import Task
 from edge.model.model import Model
 from edge.model.verify import first_series
@@ -32,9 +34,11 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     """Add the command's options."""
     parser.add_argument(
         "--model",
-        required=True,
         action="append",
-        help="model.onnx; repeat it to compare several on the same recordings",
+        default=[],
+        metavar="model.onnx",
+        help="the model; may stand without --model; repeat it to compare several on the "
+        "same recordings",
     )
     parser.add_argument(
         "--summary",
@@ -47,7 +51,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         "recordings",
         nargs="+",
         metavar="REC",
-        help=".npz files or folders",
+        help=".npz files or folders, and models",
     )
 
 
@@ -91,9 +95,12 @@ def decide(
 
 def run(arguments: argparse.Namespace) -> int:
     """Print the events; 2 if a file could not be used."""
-    models = [Model(path, arguments.engine) for path in arguments.model]
+    files, recordings = apart(arguments.recordings, *arguments.model)
+    models = [Model(path, arguments.engine) for path in files]
+    if not models or not recordings:
+        raise InputError("give a model.onnx, and recordings to replay")
     output = Output.of(arguments)
-    paths = find(arguments.recordings)
+    paths = find(recordings)
     summaries = []
     failed = 0
     for model in models:
@@ -119,9 +126,10 @@ def _replay(
 ) -> int:
     """Print a model's events of recordings; the number of files it could not use."""
     failed = 0
+    table_of = cache(read_table)
     for path in paths:
         try:
-            recording = load(path)
+            recording = load(path, table_of=table_of)
             events = decide(model, recording, str(path), error)
         except InputError as problem:
             failed += 1

@@ -1,20 +1,22 @@
 """What a person sees of a recorded touch: its curve, its decisions, and which touches
 ask for a look."""
 
-from collections.abc import Mapping, Sequence
-from typing import Any
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import Any, NamedTuple
 
 import numpy as np
 
+from edge.errors import InputError
 from edge.events import Decided
-from edge.labels import CATEGORY
+from edge.labels import CATEGORY, Labels, Standing, Table
 from edge.recording import Recording
 
 UNKNOWN = "unknown"
 """The flag of a thing that was never met; in former recordings its label too."""
 UNSURE = 0.8
 """Confidence below which a decision is unsure."""
-KINDS = ("unsure", "wrong", "unlabelled")
+KINDS = ("unsure", "wrong", "unlabelled", "left_out")
 CURVE = 32
 """Points of a small curve."""
 
@@ -72,16 +74,17 @@ def is_unsure(confidence: float | None) -> bool:
     return confidence is None or confidence < UNSURE
 
 
-def kinds(meta: Mapping[str, Any]) -> list[str]:
+def kinds(meta: Mapping[str, Any], labels: Labels, left_out: bool = False) -> list[str]:
     """The kinds of touches that a recording belongs to.
 
     A touch is unsure if a decision about it was, or was unknown; it is wrong if its
     label is another than the decision; it is unlabelled if a task that was decided has
     no label, and none follows from others.
     """
-    labels = CATEGORY.completed(meta.get("labels", {}))
+    labels = CATEGORY.completed(labels)
     decided = decisions(meta)
     belongs = dict.fromkeys(KINDS, False)
+    belongs["left_out"] = left_out
     belongs["unlabelled"] = not labels or not labels.keys() >= decided.keys()
     for task, answer in decided.items():
         belongs["unsure"] |= is_unsure(answer["confidence"])
@@ -90,10 +93,9 @@ def kinds(meta: Mapping[str, Any]) -> list[str]:
     return [kind for kind in KINDS if belongs[kind]]
 
 
-def accepted(meta: Mapping[str, Any]) -> dict[str, str]:
+def accepted(meta: Mapping[str, Any], labels: Labels) -> dict[str, str]:
     """{task: label} that accepts the decisions of a kept touch, where they name a label
     and nobody has given one yet, nor others from which another follows."""
-    labels = meta.get("labels", {})
     all_labels = CATEGORY.completed(labels)
     out = {
         task: answer["label"]
@@ -105,7 +107,63 @@ def accepted(meta: Mapping[str, Any]) -> dict[str, str]:
     return out
 
 
-def selected(meta: Mapping[str, Any], words: Sequence[str]) -> bool:
-    """Whether a recording is of every kind, or has every task, that some words name."""
-    names = {*kinds(meta), *meta.get("labels", {}), *decisions(meta)}
-    return names.issuperset(words)
+class Touch(NamedTuple):
+    """A recording, its metadata, how it stands, and the place that says so."""
+
+    path: Path
+    meta: Mapping[str, Any]
+    standing: Standing
+    place: str
+
+    @property
+    def kinds(self) -> list[str]:
+        """The kinds of touches that it belongs to."""
+        return kinds(self.meta, *self.standing)
+
+    @property
+    def words(self) -> set[str]:
+        """What selects it: its kinds, its tasks and those that were decided, and its
+        labels, such as `object=cup`."""
+        labels = self.standing.labels
+        return {
+            *self.kinds,
+            *labels,
+            *decisions(self.meta),
+            *map("=".join, labels.items()),
+        }
+
+
+def touches(
+    metas: Mapping[Path, Mapping[str, Any]], table_of: Callable[[Path], Table]
+) -> list[Touch]:
+    """How recordings stand.
+
+    Args:
+        metas: their metadata, with the labels that they were recorded with.
+        table_of: gives a folder's table.
+
+    Raises:
+        InputError: a table is damaged, or labels contacts that have their own labels.
+    """
+    out = []
+    for path, meta in metas.items():
+        table = table_of(path.parent)
+        row = table.rows.get(path.name)
+        place = f"{path}, line {row.line} of {table.path.name}" if row else str(path)
+        out.append(Touch(path, meta, table.standing(path.name, meta), place))
+    return out
+
+
+def selected(among: Sequence[Touch], words: Sequence[str]) -> list[Touch]:
+    """The touches that all words select.
+
+    Raises:
+        InputError: one names no kind, no task, and no label of a task; the sentence
+            lists these.
+    """
+    tasks = {t for it in among for t in (*it.standing.labels, *decisions(it.meta))}
+    for word in words:
+        if word not in {*KINDS, *tasks} and word.partition("=")[0] not in tasks:
+            names = ", ".join([*KINDS, *sorted(tasks)])
+            raise InputError(f"--only takes {names}, or TASK=LABEL, not {word!r}")
+    return [touch for touch in among if not words or touch.words.issuperset(words)]

@@ -4,6 +4,7 @@ import re
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from difflib import SequenceMatcher
+from itertools import chain
 
 from edge.labels import CATEGORY
 
@@ -17,46 +18,78 @@ LETTERS_PER_SLIP = 7
 """Letters of a name for each wrong one, of which one is always allowed."""
 SPACES = re.compile(r"[\s_-]+")
 MOST_NAMES = 500
-MOST = 8
-"""Sentences of a kind."""
+MOST = 20
+"""Sentences."""
+MOST_PLACES = 3
+"""Recordings that a sentence names."""
 
 Labels = Sequence[Mapping[str, str]]
 """{task: label} of each recording."""
 
 
-def slips(labels: Labels) -> list[str]:
-    """A sentence for each kind of label that is probably a slip.
+def slips(labels: Labels, places: Sequence[str]) -> list[str]:
+    """A sentence for each label that is probably a slip or contradicts others, with some
+    of the places (n,) of its recordings.
 
-    >>> slips([{"object": "box"}] * 8 + [{"object": "Box"}])
-    ["object='Box' on 1 of 9 recordings; is it 'box'?"]
+    >>> slips([{"object": "box"}] * 8 + [{"object": "Box"}], list("abcdefghi"))
+    ["object='Box': is it 'box'? (1 of 9 recordings: i)"]
     """
-    tasks = Counter(task for trial in labels for task in trial)
-    sentences = _rare("task ", tasks, len(labels))
-    for sentence, count in Counter(map(CATEGORY.contradiction, labels)).items():
-        if sentence:
-            sentences.append(f"{sentence}, on {count} of {len(labels)} recordings")
-    for task in sorted(tasks):
-        counts = _label_counts(task, labels)
-        sentences += _rare(f"{task}=", counts, counts.total())
-    return sentences
+    where: dict[str, list[str]] = {}
+    for place, sentences in zip(places, doubts(labels, singles=True), strict=True):
+        for sentence in sentences:
+            where.setdefault(sentence, []).append(place)
+    return [
+        f"{sentence} ({len(named)} of {len(labels)} recordings: "
+        f"{', '.join(named[:MOST_PLACES])}{', ...' * (len(named) > MOST_PLACES)})"
+        for sentence, named in list(where.items())[:MOST]
+    ]
 
 
-def doubts(labels: Labels) -> list[list[str]]:
-    """Of each recording, a sentence for each label that is probably a slip, or
-    contradicts others.
+def doubts(labels: Labels, *, singles: bool = False) -> list[list[str]]:
+    """Of each recording, a sentence for each task or label that is probably a slip, or
+    contradicts others, or (`singles`) that no other one has.
 
     >>> doubts([{"object": "box"}] * 8 + [{"object": "Box"}])[-1]
     ["object='Box': is it 'box'?"]
     """
-    slip = {}
-    for task in set().union(*labels):
-        for name, likely in _likely(_label_counts(task, labels)).items():
-            slip[task, name] = f"{task}={name!r}: is it {likely!r}?"
+    doubtful = _doubtful(labels, singles)
     sentences = []
     for trial in labels:
-        named = [CATEGORY.contradiction(trial), *map(slip.get, trial.items())]
-        sentences.append([sentence for sentence in named if sentence])
+        names = [*(("", task) for task in trial), *trial.items()]
+        named = [CATEGORY.contradiction(trial), *map(doubtful.get, names)]
+        sentences.append(list(filter(None, named)))
     return sentences
+
+
+def _doubtful(labels: Labels, singles: bool) -> dict[tuple[str, str], str]:
+    """{(task, label), or ("", task): a sentence} of those that are probably slips."""
+    doubtful = {}
+    tasks = Counter(chain(*labels))
+    of_tasks = {task: _label_counts(task, labels) for task in sorted(tasks)}
+    for task, counts in {"": tasks, **of_tasks}.items():
+        likely = _likely(counts)
+        total = counts.total() if task else len(labels)
+        for name, count in counts.items():
+            text = f"{task}={name!r}" if task else f"task {name!r}"
+            if name in likely:
+                doubtful[task, name] = f"{text}: is it {likely[name]!r}?"
+            elif singles and count == 1 and len(counts) < total:
+                doubtful[task, name] = f"{text} stands alone"
+    return doubtful
+
+
+def too_few(labels: Labels) -> list[str]:
+    """A sentence where the recordings are of two things, so that none can be unknown.
+
+    >>> too_few([{"object": "box"}, {"object": "cup"}])
+    ['record a third object, and the model can tell what it does not know']
+    """
+    kinds = {CATEGORY.task, *CATEGORY.factors}
+    names = [set(trial.items()) for trial in labels]
+    things = Counter(task for task, _ in set().union(*names) if task not in kinds)
+    if things and max(things.values()) == 2:
+        return ["record a third object, and the model can tell what it does not know"]
+    return []
 
 
 def counts_text(labels: Labels) -> list[str]:
@@ -74,27 +107,6 @@ def counts_text(labels: Labels) -> list[str]:
 def _label_counts(task: str, labels: Labels) -> Counter[str]:
     """How many recordings have each label of a task."""
     return Counter(trial[task] for trial in labels if task in trial)
-
-
-def _rare(thing: str, counts: Mapping[str, int], total: int) -> list[str]:
-    """Sentences on the names that are probably slips.
-
-    Args:
-        thing: stands before each name.
-        counts: of the recordings with each name.
-        total: recordings that could have one.
-    """
-    sentences = []
-    likely = _likely(counts)
-    for name, count in sorted(counts.items()):
-        if name in likely:
-            sentences.append(
-                f"{thing}{name!r} on {count} of {total} recordings; is it "
-                f"{likely[name]!r}?"
-            )
-        elif count == 1 and len(counts) < total:
-            sentences.append(f"{thing}{name!r} on a single recording")
-    return sentences[:MOST]
 
 
 def _likely(counts: Mapping[str, int]) -> dict[str, str]:

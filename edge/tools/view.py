@@ -22,7 +22,7 @@ import numpy as np
 
 from edge.arrays import Bytes, Floats
 from edge.classifier import Classifier
-from edge.commands.options import add_reading
+from edge.commands.options import add_file, add_reading
 from edge.commands.output import Output, counted
 from edge.commands.source import reading
 from edge.commands.texts import event_text
@@ -65,7 +65,7 @@ MOST_EVENTS = 8
 
 def add_options(parser: argparse.ArgumentParser) -> None:
     """Add the command's options."""
-    parser.add_argument("--model", help="model.onnx, to show its decisions too")
+    add_file(parser, "model", "a model, to show its decisions too")
     add_reading(parser, " (in place of the terminal)")
 
 

@@ -20,6 +20,13 @@ COMMANDS = (
 )
 """`export` is a program of its own; `python -m train` runs the others."""
 
+MEANT = {
+    **dict.fromkeys(("predict", "classify", "decide", "test"), ("replay", "run")),
+    **dict.fromkeys(("train", "fit"), ("export",)),
+    **dict.fromkeys(("plot", "draw"), ("show",)),
+}
+"""{the word of other programs: the commands that do this}."""
+
 
 def run(words: Sequence[str]) -> int:
     """Run a command in the checkout that this package is part of; its exit status.
@@ -48,9 +55,9 @@ def run(words: Sequence[str]) -> int:
 
 def refuse_command(program: str, word: str, commands: Sequence[str]) -> int:
     """Say that there is no such command, and which may have been meant; returns 2."""
-    similar = get_close_matches(word, commands, 1, 0.5)
+    similar = MEANT.get(word) or get_close_matches(word, commands, 1, 0.5)
     hint = f"the commands are {', '.join(commands)}"
     if similar:
-        hint = f"did you mean {similar[0]!r}?"
+        hint = f"did you mean {' or '.join(map(repr, similar))}?"
     print(f"{program}: there is no command {word!r}; {hint}", file=sys.stderr)
     return 2

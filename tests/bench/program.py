@@ -37,12 +37,12 @@ def start(measure, description, *options):
         description=description.partition("\n\n")[0],
         formatter_class=argparse.ArgumentDefaultsHelpFormatter,
     )
+    names = [name.lstrip("-").replace("-", "_") for name, _, _ in options]
     for name, default, text in options:
         top.add_argument(name, help=text, **kind_of(default))
 
     def run(arguments):
-        words = {name: v for name, v in vars(arguments).items() if name != "run"}
-        return measure(**words) or 0
+        return measure(**{name: vars(arguments)[name] for name in names}) or 0
 
     top.set_defaults(run=run)
     sys.exit(dispatch(top, None))

@@ -54,6 +54,7 @@ def test_without_a_command_the_commands_are_listed(capsys):
     [
         ("reply", "there is no command 'reply'; did you mean 'replay'?"),
         ("dance!", "the commands are check, scan,"),
+        ("predict", "there is no command 'predict'; did you mean 'replay' or 'run'?"),
     ],
 )
 def test_a_typing_error_is_answered_by_the_nearest_command(typed, sentence, capsys):
@@ -152,3 +153,60 @@ def test_a_stream_that_was_closed_before_the_start_is_no_traceback(closed, tmp_p
 
 def test_the_version_is_the_package_s():
     assert python("-m", "edge", "--version").stdout == f"edge-classify {__version__}\n"
+
+
+EMPTY = [
+    *([name, ""] for name in cli.COMMANDS),
+    ["install", str(MODEL), "--to", ""],
+    ["label", "--set", "a=b", "--yes", ".", ""],
+    ["replay", "--model=", "."],
+]
+
+
+@pytest.mark.parametrize("words", EMPTY, ids=" ".join)
+def test_an_empty_argument_is_refused(words, capsys):
+    with pytest.raises(SystemExit) as ended:
+        cli.main(words)
+    assert ended.value.code == 2
+    assert "an argument is empty" in capsys.readouterr().err
+
+
+TOUCH = MODEL.parent / "pillow-movable.npz"
+SKIN = skinfile.shipped("cody")
+GOLDEN = ROOT / "tests" / "golden"
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ["info", "--model", MODEL],
+        ["replay", "--model", MODEL, TOUCH],
+        ["explain", "--model", MODEL, TOUCH],
+        ["verify", "--model", GOLDEN / "model.onnx", "--golden", GOLDEN / "golden.npz"],
+        ["check", "--skin", SKIN],
+        ["scan", "--skin", SKIN, "--fake", TOUCH],
+    ],
+    ids=lambda words: words[0],
+)
+def test_a_model_and_a_skin_may_stand_without_their_option(words, edge):
+    bare = [word for word in words if word not in ("--model", "--skin")]
+    answers = []
+    for line in (words, bare):
+        status, out, _ = edge(*line, text=True)
+        answers.append((status, re.sub(r'"latency_ms": [\d.]+', "", out)))
+    assert answers[0] == answers[1]
+    assert answers[0][0] < 2
+
+
+@pytest.mark.parametrize(
+    ("words", "sentence"),
+    [
+        (["verify"], "a model is required: name its file"),
+        (["verify", "a.onnx", "b.onnx"], "unrecognized arguments: b.onnx"),
+        (["verify", "a.onnx", "--skin"], "unrecognized arguments: --skin"),
+    ],
+)
+def test_a_command_without_its_model_or_with_two_says_so(words, sentence, capsys):
+    with pytest.raises(SystemExit):
+        cli.main(words)
+    assert sentence in capsys.readouterr().err

@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 from edge.errors import InputError
-from edge.recording import LARGEST_BYTES, Recording, load
+from edge.npz import LARGEST_BYTES
+from edge.recording import Recording, load
 from edge.saving import find, save
 
 
@@ -241,3 +242,21 @@ def test_an_axis_that_never_changes_is_said(make_touch, tmp_path, caplog):
     still[..., 1] = 0
     save(tmp_path / "a.npz", replace(touch, shear=still))
     assert "a.npz: its shear never changes along an axis" in caplog.text
+
+
+def test_a_part_whose_name_is_damaged_or_unknown_is_refused_and_not_ignored(
+    tmp_path, make_touch
+):
+    path = tmp_path / "a.npz"
+    save(path, make_touch())
+    whole = path.read_bytes()
+    at = whole.rindex(b"joints.npy")
+    for place in range(at, at + len("joints.npy")):
+        path.write_bytes(whole[:place] + bytes([whole[place] ^ 1]) + whole[place + 1 :])
+        with pytest.raises(InputError, match="a.npz: .*copy or record it again"):
+            load(path)
+    path.write_bytes(whole)
+    with zipfile.ZipFile(path, "a") as archive, pytest.warns(match="Duplicate"):
+        archive.writestr("joints.npy", archive.read("joints.npy"))
+    with pytest.raises(InputError, match="has a part 'joints.npy', which no recording"):
+        load(path)

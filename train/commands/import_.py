@@ -1,7 +1,7 @@
 """Turn another lab's data into recordings.
 
 Writes one recording for each trial; existing files of the same name are replaced. Data
-without thresholds get those that `python -m train thresholds` proposes. To add a
+without thresholds get those that `edge-classify thresholds` proposes. To add a
 format, see train/importers/__init__.py.
 """
 
@@ -184,5 +184,5 @@ def set_thresholds(trials: Sequence[tuple[Path, Recording]]) -> str:
     return (
         f"threshold {threshold} and onset {onset} counts, from "
         f"{proposal.source}: {touched} of {len(trials)} have a contact; "
-        "`python -m train thresholds` compares other thresholds"
+        "`edge-classify thresholds` compares other thresholds"
     )

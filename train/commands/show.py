@@ -8,6 +8,7 @@ recordings side by side, with the decisions of --model.
 import argparse
 from pathlib import Path
 
+from edge.commands.options import add_file, apart
 from edge.errors import InputError
 
 
@@ -19,11 +20,8 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         nargs="+",
         help="an .npz recording, or several to compare",
     )
-    option(
-        "--model",
-        metavar="model.onnx",
-        help="draw the reasons for its decision on a recording, its decisions on several",
-    )
+    text = "draw the reasons for its decision on a recording, its decisions on several"
+    add_file(parser, "model", text)
     text = "with --model, the folder of the training trials (default: that of the recording)"
     option("--data", type=Path, metavar="DIR", help=text)
     option(
@@ -43,16 +41,19 @@ def run(arguments: argparse.Namespace) -> int:
     from edge.model.model import Model
     from edge.recording import load
 
-    first = arguments.recording[0]
+    models, recordings = apart(arguments.recording, arguments.model)
+    if len(models) > 1 or not recordings:
+        raise InputError("give recordings to draw, and at most one model.onnx")
+    first = recordings[0]
     out = Path(arguments.out or Path(first).with_suffix(".png"))
-    several = len(arguments.recording) > 1
+    several = len(recordings) > 1
     if arguments.dark and not several:
         raise InputError("--dark is for several recordings")
-    model = None if arguments.model is None else Model(arguments.model)
+    model = Model(models[0]) if models else None
     if several:
         from train.draw import comparison
 
-        touches = [(path, load(path)) for path in arguments.recording]
+        touches = [(path, load(path)) for path in recordings]
         comparison.draw(touches, out, model=model, dark=arguments.dark)
     elif model is not None:
         from train.draw import explanation

@@ -1,7 +1,7 @@
 """Show the price of accuracy in time: waiting, the wire, arithmetic.
 
 Writes OUT/report.html (nothing outside it is linked), each plot as PNG, each table as
-CSV, and front.json, which `python -m export --front` reads.
+CSV, and front.json, which `edge-classify export --front` reads.
 """
 
 import argparse
@@ -55,10 +55,10 @@ def run(arguments: argparse.Namespace) -> int:
     """Work and write."""
     from train.tradeoff.run import Options, require_enough, tradeoff
 
-    check_writable(arguments.out)  # before the work
     if arguments.check:
         require_enough(len(find(arguments.data)))
         return 0
+    check_writable(arguments.out)  # before the work
     if arguments.board is None:
         raise InputError("give --board board.json, which `edge-classify bench` writes")
     options = Options(

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import hashlib
 import io
+import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property
+from functools import cache, cached_property
 from itertools import compress
 from operator import not_
 from pathlib import Path
@@ -17,7 +18,9 @@ from joblib import delayed
 from edge.arrays import Booleans, Floats
 from edge.errors import InputError
 from edge.files import read_bytes
-from edge.recording import LARGEST_BYTES, Recording, load
+from edge.labels import read_table
+from edge.npz import LARGEST_BYTES
+from edge.recording import Recording, load
 from edge.saving import find
 from edge.touch import measures
 from edge.touch.arm import Chain
@@ -55,7 +58,7 @@ class Recordings:
     Attributes:
         paths: of the files, in their order.
         recordings: one a file.
-        digest: SHA-256 over the files' bytes.
+        digest: SHA-256 over the files' bytes, and over labels that a table gives.
     """
 
     paths: tuple[Path, ...]
@@ -96,7 +99,7 @@ class DataSet:
         chain: the arm, where the trials have joint angles and a feature needs them;
             motion is then in the world's frame.
         untouched: recordings in which no contact was found, with their labels.
-        digest: SHA-256 over the recordings' bytes.
+        digest: of the recordings, see `Recordings`.
         names: the features that were measured, by default the paper's three.
         joints: number of joint angles, where a feature is made of them; else 0.
         tasks: keys of the labels, sorted.
@@ -242,10 +245,13 @@ def read(data: Sequence[str | Path], *, progress: bool = False) -> Recordings:
         )
     digest = hashlib.sha256()
     recordings: list[Recording] = []
+    table_of = cache(read_table)
     for path in bar(paths, desc="reading", disable=not progress):
         contents = read_bytes(path, LARGEST_BYTES)
-        recordings.append(load(path, io.BytesIO(contents)))
+        recordings.append(load(path, io.BytesIO(contents), table_of))
         digest.update(contents)
+        if path.name in table_of(path.parent).rows:
+            digest.update(json.dumps(recordings[-1].labels, sort_keys=True).encode())
     return Recordings(tuple(paths), tuple(recordings), digest.hexdigest())
 
 

@@ -58,7 +58,7 @@ def leaks(dataset: DataSet, y: Labels) -> list[str]:
     if share > 0.5:
         advice = "record from before the touch"
         if proposed(recordings).onset > dataset.layout.onset:
-            advice += ", or take higher thresholds (`python -m train thresholds`)"
+            advice += ", or take higher thresholds (`edge-classify thresholds`)"
         return [
             f"warning: {share:.0%} of the touches begin with their "
             f"recording, so their onset is not known; {advice}"

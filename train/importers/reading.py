@@ -146,13 +146,6 @@ def read_text(path: Path) -> Table:
         return Table(str(path), table, header.named, text.decimal, form=tuple(form))
 
 
-def read_labels(path: Path) -> pd.DataFrame:
-    """The columns of a text file with a header; each cell is text as it stands."""
-    with _opened(path) as text:
-        header = _header(text)
-        return _texts(text, header, header.filled(text))
-
-
 def read_frame(path: Path) -> NDArray[np.float64]:
     """(rows, columns) of the numbers in a text file without a header."""
     with _opened(path) as text:

@@ -2,7 +2,7 @@
 before their columns are understood."""
 
 import re
-from collections.abc import Callable, Iterable, Iterator, Sequence, Set
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence, Set
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, TypeVar
@@ -11,6 +11,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from edge import labels as beside
 from edge.config import short_text
 from edge.errors import InputError, about
 from edge.files import parsing
@@ -21,14 +22,12 @@ from train.importers.reading import (
     TEXTS,
     inner,
     read_frame,
-    read_labels,
     read_parquet,
     read_text,
     suffix_of,
 )
 from train.importers.tables import Table, numbered, require_filled, require_unique
 
-LABELS = "labels.csv"
 SKIN = "skin.json"
 SUFFIXES = (*TEXTS, ".parquet", *arrays.SUFFIXES)
 NUMBERED = re.compile(r"(?:trial|rec|recording|run|take|sample|test)?[\s_.-]*\d+", re.I)
@@ -104,8 +103,8 @@ def sources_in(path: Path, options: TableOptions) -> Iterator[Source | Refused]:
     """
     folder = path if path.is_dir() else path.parent
     sources = _sources(path, folder, options)
-    if (folder / LABELS).is_file():
-        return _labelled(list(sources), folder / LABELS, options.task)
+    if (folder / beside.TABLE).is_file():
+        return _labelled(list(sources), folder / beside.TABLE, options.task)
     return sources
 
 
@@ -119,35 +118,39 @@ def _labelled(
     Raises:
         InputError: it names none of the trials.
     """
-    trials = [source.name for source in sources if isinstance(source, Source)]
-    rows = _label_rows(path, trials)
-    files = {_name(file, path.parent) for file in _visible(path.parent)}
-    for row in sorted(rows.keys() - {*trials, *files}):
-        yield Refused(f"{path}: {row} names no file")
-    for source in sources:
-        if isinstance(source, Refused):
-            yield source
-            continue
-        if source.name not in rows:
-            yield Refused(f"{path}: has no row for {source.name}, which has no label")
-        labels = {**source.labels, task: "", **rows.get(source.name, {})}
-        labels = {key: label for key, label in labels.items() if label}
-        yield replace(source, labels=labels, label=LABELS)
-
-
-def _label_rows(path: Path, trials: list[str]) -> dict[str, dict[str, str]]:
-    """{trial: {task: label}} of a labels.csv."""
-    data = read_labels(path)
-    if "trial" not in data or not data["trial"].isin(trials).any():
+    table = beside.read_table(path.parent, "trial")
+    trials = {source.name for source in sources if isinstance(source, Source)}
+    rows = {}
+    for row in table.rows:
+        rows[row if row in trials else _name(path.parent / row, path.parent)] = row
+    if rows.keys().isdisjoint(trials):
         raise InputError(
-            f"{path}: needs a column trial with names such as {short_text(trials)}"
+            f"{path}: needs a column file with names such as {short_text(sorted(trials))}"
         )
-    require_filled(path, data, "trial")
-    repeated = data["trial"][data["trial"].duplicated()]
-    if len(repeated):
-        raise InputError(f"{path}: {repeated.iloc[0]} has two rows; remove one of them")
-    rows = data.set_index("trial").iterrows()
-    return {str(trial): row.dropna().to_dict() for trial, row in rows}
+    yield from _strangers(table, rows, trials)
+    for source in sources:
+        if isinstance(source, Source):
+            labels, left_out = table.standing(
+                rows.get(source.name, ""), {"labels": {**source.labels, task: ""}}
+            )
+            if left_out:
+                continue
+            labels = {key: label for key, label in labels.items() if label}
+            source = replace(source, labels=labels, label=beside.TABLE)
+        yield source
+
+
+def _strangers(
+    table: beside.Table, rows: Mapping[str, str], trials: Set[str]
+) -> Iterator[Refused]:
+    """Rows of a labels.csv, by their trial, without a file, and trials without a row."""
+    folder = table.path.parent
+    files = {_name(file, folder) for file in _visible(folder)}
+    for name in sorted(rows.keys() - trials - files):
+        line = table.rows[rows[name]].line
+        yield Refused(f"{table.path}, line {line}: {rows[name]} names no file")
+    for name in sorted(trials - rows.keys()):
+        yield Refused(f"{table.path}: has no row for {name}, which has no label")
 
 
 def _sources(
@@ -184,7 +187,9 @@ def _visible(folder: Path) -> list[Path]:
 def _files(paths: Iterable[Path]) -> list[Path]:
     """The tables among paths."""
     return [
-        path for path in paths if path.name != LABELS and suffix_of(path) in SUFFIXES
+        path
+        for path in paths
+        if path.name != beside.TABLE and suffix_of(path) in SUFFIXES
     ]
 
 

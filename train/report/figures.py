@@ -33,6 +33,7 @@ STYLE: dict[Any, Any] = {
     "axes.grid": True,
     "grid.alpha": 0.25,
     "axes.axisbelow": True,
+    "axes.formatter.useoffset": False,
     "hatch.linewidth": 0.6,
     "text.parse_math": False,  # a label with two dollar signs is no formula
 }

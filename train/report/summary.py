@@ -163,7 +163,7 @@ def _untouched(dataset: DataSet) -> Iterator[str]:
     line += _files(paths)
     total = len(dataset.trials) + len(dataset.untouched)
     if len(paths) / total > MISSING_SHARE:
-        line = f"warning: {line}; `python -m train thresholds` proposes thresholds"
+        line = f"warning: {line}; `edge-classify thresholds` proposes thresholds"
     yield line
 
 

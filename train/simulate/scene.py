@@ -9,7 +9,7 @@ from typing import Any
 
 from edge.config import REQUIRED, ConfigTable, read_toml
 from edge.errors import InputError
-from edge.recording import LARGEST_BYTES
+from edge.npz import LARGEST_BYTES
 from edge.skin.file import shipped
 from edge.touch.arm import Chain
 from edge.touch.arm_file import read_arm

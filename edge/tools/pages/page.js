@@ -6,7 +6,9 @@
 const $ = (id) => document.getElementById(id);
 const query = location.search;
 let latest = null;
+let list = { trials: [], total: 0, all: 0, words: [], doubts: [] };
 let trials = [];
+let start = 0;
 let version = null;
 let askedAt = 0;
 
@@ -266,7 +268,8 @@ function taskGroup(task, choose) {
   group.dataset.task = task;
   group.append(element("legend", task));
   const fixed = latest.choices[task] || [];
-  const used = trials.map((trial) => trial.labels[task]).filter(Boolean);
+  const used = list.words.map(([word]) => word).filter((word) => word.startsWith(task + "="))
+    .map((word) => word.slice(task.length + 1));
   for (const name of new Set([...fixed, ...used])) {
     const node = button(name, () => choose(task, name));
     node.dataset.label = name;
@@ -310,10 +313,10 @@ function setDigits(box) {
   });
 }
 
-// A form for the labels of touches in the list, apart from those of the next touch.
-function edit(place, filesOf) {
+// A form for the labels of touches in the list, apart from those of the next touch. It changes them
+// only if they still stand as they did when it was opened.
+function edit(place, touched) {
   document.querySelectorAll(".editor").forEach((other) => other.remove());
-  const touched = trials.filter((trial) => filesOf().includes(trial.file));
   const labels = {};
   const groups = {};
   const form = element("form", undefined, "editor");
@@ -334,7 +337,7 @@ function edit(place, filesOf) {
   form.onsubmit = async (event) => {
     event.preventDefault();
     for (const input of form.querySelectorAll("input")) input.onchange();
-    if (Object.keys(labels).length && !await act({ do: "relabel", files: filesOf(), labels })) return;
+    if (Object.keys(labels).length && !await change("relabel", touched, { labels })) return;
     form.remove();
     if (place === $("ticked")) tickAll(false);
   };
@@ -382,43 +385,57 @@ function drawRecord(picture) {
     const what = labelText(picture.labels);
     $("record").setAttribute("aria-pressed", picture.recording);
     say("record", picture.recording ? "Stop" : "Record");
-    say("recording", !what ? "Give a label, then record."
+    say("recording", picture.waits.length ? `Choose ${picture.waits.join(" and ")} to begin.`
+      : !what ? "Give a label, then record."
       : picture.recording ? `Each touch is saved as ${what}.` : `Not recording. The next touch would be ${what}.`);
   }
-  say("folder", `${trials.length} ${trials.length === 1 ? "touch" : "touches"} in ${picture.folder}.`);
-  const late = picture.decides && performance.now() - askedAt > 2000;
-  if (picture.trials !== version || late) fetchTrials(picture.trials);
+  say("folder", `${list.all} ${list.all === 1 ? "touch" : "touches"} in ${picture.folder}.`);
+  if (picture.trials !== version || performance.now() - askedAt > 2000) fetchTrials(picture.trials);
 }
 
 async function fetchTrials(number) {
   version = number;
   askedAt = performance.now();
-  const answer = await post({ do: "trials" });
-  if (!answer || !answer.ok) return;
-  const list = await answer.json();
-  trials = list.trials.map((trial, i) => ({ ...trial, doubts: list.doubts[i] }));
-  $("doubts").replaceChildren(...list.doubts.at(-1).map((text) => element("li", text)));
+  const asked = { only: $("filter").value, start };
+  const answer = await post({ do: "trials", ...asked });
+  if (!answer || !answer.ok || asked.only !== $("filter").value || asked.start !== start) return;
+  list = await answer.json();
+  trials = list.trials;
+  if (start && !trials.length) turn(0);
+  $("doubts").replaceChildren(...list.doubts.map((text) => element("li", text)));
+  drawUndo(list.undo);
   drawTrials();
 }
 
-function shownTrials() {
-  const kind = $("filter").value;
-  return trials.filter((trial) => kind === "" || [...trial.kinds, ...tasksOf([trial])].includes(kind));
+// Fifty touches at a time, the newest first.
+function turn(to) {
+  start = Math.max(to, 0);
+  $("trials").replaceChildren();
+  fetchTrials(version);
 }
 
 function drawFilter() {
-  const names = ["unsure", "wrong", "unlabelled", ...new Set(tasksOf(trials))];
-  const text = JSON.stringify(names);
-  if ($("filter").dataset.names === text) return;
+  const text = JSON.stringify(list.words);
+  if ($("filter").dataset.words === text) return;
   const chosen = $("filter").value;
-  $("filter").dataset.names = text;
-  const options = ["", ...names].map((name) => {
-    const option = element("option", name || "all touches");
-    option.value = name;
+  $("filter").dataset.words = text;
+  const words = new Map([["", list.all], ...["unsure", "wrong", "unlabelled", "left_out"].map((kind) => [kind, 0]),
+    ...list.words]);
+  if (!words.has(chosen)) words.set(chosen, 0);
+  const options = [...words].map(([word, count]) => {
+    const option = element("option", `${word || "all touches"} (${count})`);
+    option.value = word;
     return option;
   });
   $("filter").replaceChildren(...options);
-  $("filter").value = ["", ...names].includes(chosen) ? chosen : "";
+  $("filter").value = chosen;
+}
+
+function drawTurns() {
+  const last = start + trials.length;
+  say("range", list.total > list.trials.length ? `${start + 1} to ${last} of ${list.total}` : "");
+  $("newer").hidden = !start;
+  $("older").hidden = last >= list.total;
 }
 
 function labelOf({ label, flags }) {
@@ -446,16 +463,18 @@ function breaking(tag, text, className) {
   return node;
 }
 
-// New touches come last, and a row is made anew only where its touch has changed: nothing moves
-// under the pointer, and the focus and what is written stay.
+// A row is made anew only where its touch has changed, and new touches come in when neither the
+// pointer nor the focus is in the list: nothing moves under them, and what is written stays.
 function drawTrials() {
   drawFilter();
-  const list = $("trials");
+  drawTurns();
+  const box = $("trials");
   const focused = document.activeElement.closest("#trials > li");
-  const place = focused && [...list.children].indexOf(focused);
+  const place = focused && [...box.children].indexOf(focused);
   const name = document.activeElement.textContent;
-  const former = new Map([...list.children].map((row) => [row.dataset.file, row]));
-  const rows = shownTrials().map((trial) => {
+  const former = new Map([...box.children].map((row) => [row.dataset.file, row]));
+  const still = former.size > 0 && box.matches(":hover, :focus-within");
+  const rows = trials.filter((trial) => !still || former.has(trial.file)).map((trial) => {
     const row = former.get(trial.file);
     if (row && row.dataset.text === JSON.stringify(trial)) return row;
     const fresh = trialRow(trial);
@@ -465,16 +484,17 @@ function drawTrials() {
     return fresh;
   });
   const present = new Set(rows);
-  for (const row of [...list.children]) if (!present.has(row)) row.remove();
-  rows.forEach((row, i) => { if (list.children[i] !== row) list.insertBefore(row, list.children[i] || null); });
+  for (const row of [...box.children]) if (!present.has(row)) row.remove();
+  rows.forEach((row, i) => { if (box.children[i] !== row) box.insertBefore(row, box.children[i] || null); });
   drawTicked();
-  if (!focused || list.contains(focused) || !rows.length) return;
+  if (!focused || box.contains(focused) || !rows.length) return;
   const buttons = [...rows[Math.min(place, rows.length - 1)].querySelectorAll("button")];
   (buttons.find((button) => button.textContent === name) || buttons[0]).focus();
 }
 
-function tickedFiles() {
-  return [...document.querySelectorAll("#trials > li > input:checked")].map((tick) => tick.parentNode.dataset.file);
+function ticked() {
+  return [...document.querySelectorAll("#trials > li > input:checked")]
+    .map((tick) => JSON.parse(tick.parentNode.dataset.text));
 }
 
 function tickAll(on) {
@@ -483,41 +503,42 @@ function tickAll(on) {
 }
 
 function drawTicked() {
-  const files = tickedFiles();
-  $("ticked").hidden = !files.length;
-  $("all").checked = files.length > 0 && files.length === $("trials").children.length;
-  say("number", `${files.length} ticked:`);
-  $("accept-ticked").hidden = !trials.some((trial) => files.includes(trial.file) && canAccept(trial));
+  const touches = ticked();
+  $("ticked").hidden = !touches.length;
+  $("all").checked = touches.length > 0 && touches.length === $("trials").children.length;
+  say("number", `${touches.length} ticked:`);
+  $("accept-ticked").hidden = !touches.some(canAccept);
 }
 
 function canAccept(trial) {
   return Object.keys(trial.accepted).length > 0;
 }
 
-function remove(files) {
-  const what = files.length === 1 ? files[0] : `${files.length} touches`;
-  if (confirm(`Delete ${what}?`)) act({ do: "delete", files });
+// What a person saw goes with the change, so that it cannot undo what another has written since.
+function change(what, touches, more) {
+  const seen = touches.map(({ file, labels, left_out }) => ({ file, labels, left_out }));
+  return act({ do: what, touches: seen, ...more });
 }
 
 function trialRow(trial) {
   const row = element("li");
   row.dataset.text = JSON.stringify(trial);
   row.dataset.file = trial.file;
-  const files = [trial.file];
   const tick = element("input");
   tick.type = "checkbox";
   tick.setAttribute("aria-label", `tick ${trial.file}`);
   tick.onchange = drawTicked;
   const buttons = element("div", undefined, "buttons");
   if (canAccept(trial)) {
-    const accept = button("Accept", () => act({ do: "accept", files }));
+    const accept = button("Accept", () => change("accept", [trial]));
     accept.title = labelText(trial.accepted);
     buttons.append(accept);
   }
   const decided = Object.entries(trial.decided);
   buttons.append(
-    button(decided.length ? "Correct" : "Relabel", () => edit(row, () => files)),
-    button("Delete", () => remove(files)),
+    button(decided.length ? "Correct" : "Relabel", () => edit(row, [trial])),
+    trial.left_out ? button("Put back", () => change("put_back", [trial]))
+      : button("Leave out", () => change("leave_out", [trial])),
   );
   const text = element("div");
   text.append(breaking("strong", labelText(trial.labels) || "no label"));
@@ -529,9 +550,9 @@ function trialRow(trial) {
   return row;
 }
 
-function drawUndo({ undo }) {
-  $("undo").hidden = !undo.length;
-  say("undo", `Undo the change of ${undo.length === 1 ? undo[0] : `${undo.length} touches`}`);
+function drawUndo([last]) {
+  $("undo").hidden = !last;
+  if (last) say("undo", `Undo: ${last.command}`);
 }
 
 // The notices are a stream's last: new are those that follow the former ones.
@@ -559,16 +580,19 @@ function draw(picture) {
   drawContact(picture);
   drawDecisions(picture);
   drawRecord(picture);
-  drawUndo(picture);
   drawNotices(picture);
 }
 
-$("undo").onclick = () => act({ do: "undo" });
+$("undo").onclick = () => act({ do: "undo", time: list.undo[0].time });
 $("all").onchange = () => tickAll($("all").checked);
-$("accept-ticked").onclick = async () => await act({ do: "accept", files: tickedFiles() }) && tickAll(false);
-$("label-ticked").onclick = () => edit($("ticked"), tickedFiles);
-$("delete-ticked").onclick = () => remove(tickedFiles());
-$("filter").onchange = drawTrials;
+$("accept-ticked").onclick = async () => await change("accept", ticked()) && tickAll(false);
+$("label-ticked").onclick = () => edit($("ticked"), ticked());
+$("leave-ticked").onclick = async () => await change("leave_out", ticked()) && tickAll(false);
+$("filter").onchange = () => turn(0);
+$("newer").onclick = () => turn(start - 50);
+$("older").onclick = () => turn(start + 50);
+$("trials").onmouseleave = drawTrials;
+$("trials").addEventListener("focusout", () => setTimeout(drawTrials));
 addEventListener("keydown", (event) => {
   const writes = event.target.matches("select, textarea, input:not([type=checkbox])");
   if (writes || event.ctrlKey || event.metaKey) return;

@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 from edge import demo
-from edge.cli import parser
+from edge.cli import parsed, parser
 from tests.conftest import ROOT, lines, started
 
 UNIT = ROOT / "docs" / "examples" / "service" / "edge-classify.service"
@@ -71,7 +71,7 @@ def test_the_units_command_with_and_without_an_arm_is_one_that_edge_classify_tak
     assert Path(program).name == "edge-classify"
     assert words.pop() == "$ARGUMENTS"
     without, arm = (
-        parser().parse_args([*words, *shlex.split(*shlex.split(e))]) for e in examples()
+        parsed(parser(), [*words, *shlex.split(*shlex.split(e))]) for e in examples()
     )
     assert without.joints is None
     assert arm.joints == "udp:47401"

@@ -38,7 +38,7 @@ def test_a_person_gets_lines_that_fit(edge, exported, recordings, monkeypatch):
 
 def test_what_cannot_be_explained_is_one_sentence(exported, quiet, refused):
     err = refused("explain", exported / "model.onnx")
-    assert "name the recordings to explain after the model" in err
+    assert "and the recordings to explain" in err
     err = refused("explain", exported / "model.onnx", quiet)
     assert "quiet.npz: holds no contact; leave it out" in err
 

@@ -1,13 +1,13 @@
 """Labels of recordings, listed and changed."""
 
-import shutil
 from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
+from edge.labels import TABLE
 from edge.recording import load
-from edge.saving import change_all, find, save
+from edge.saving import find, save
 from tests.edge.tools.kept import kept_meta
 
 
@@ -41,7 +41,8 @@ def test_the_labels_of_a_folder_are_listed_and_its_files_left_alone(folder, a, e
 
 
 def test_a_label_that_would_act_on_a_terminal_is_counted_as_an_escape(a, edge):
-    change_all({a: {"object": "\x1b[2J"}})
+    touch = load(a)
+    save(a, replace(touch, meta={**touch.meta, "labels": {"object": "\x1b[2J"}}))
     status, _, err = edge("label", a)
     assert status == 0
     assert err.endswith("object (1 of 1): _[2J 1\n")
@@ -69,10 +70,9 @@ def test_the_label_of_a_task_is_taken_away(a, edge):
 
 
 def test_what_cannot_be_changed_leaves_every_file_as_it_was(a, refused):
-    before = a.read_bytes()
     err = refused("label", a.parent, "--set", "object=x", "--yes")
-    assert "b.npz: its contacts have labels of their own" in err
-    assert a.read_bytes() == before
+    assert "the contacts of b.npz have labels of their own" in err
+    assert not (a.parent / TABLE).exists()
 
 
 @pytest.mark.parametrize("second", [("--set", "object=lid"), ("--unset", "object")])
@@ -89,25 +89,6 @@ def test_nothing_changes_before_it_is_shown_and_agreed_to(a, refused):
     assert "object=hard 0 becomes category=rigid-fixed object=brick" in err
     assert "1 recording would change, as shown; add --yes to do it" in err
     assert a.read_bytes() == before
-
-
-@pytest.mark.parametrize("days", [["tuesday"], ["monday", "tuesday"]])
-def test_a_change_of_several_folders_is_taken_back_in_one_or_all(
-    days,
-    make_touch,
-    tmp_path,
-    edge,
-):
-    """Each recording's label was changed on its own, and then with the other's."""
-    paths = {day: tmp_path / day / "a.npz" for day in ("monday", "tuesday")}
-    for path in paths.values():
-        save(path, make_touch())
-        change_all({path: {"object": "first"}})
-    change_all({path: {"object": "second"} for path in paths.values()})
-    assert edge("label", *(tmp_path / day for day in days), "--undo")[0] == 0
-    for day, path in paths.items():
-        expected = "first" if day in days else "second"
-        assert load(path).labels == {"object": expected}
 
 
 @pytest.fixture
@@ -161,52 +142,81 @@ def test_a_decision_is_accepted_but_for_what_is_corrected(kept, edge):
     assert load(kept / "unsure.npz").labels == {"softness": "soft"}
 
 
-def test_the_last_change_of_labels_is_taken_back(kept, edge, refused):
-    before = (kept / "wrong.npz").read_bytes()
-    edge("label", kept, "--accept", "--yes")
-    assert edge("label", kept, "--undo")[0] == 0
-    assert (kept / "wrong.npz").read_bytes() == before
-    assert load(kept / "sure.npz").labels == {}
-    assert "there is no change to take back" in refused("label", kept, "--undo")
-
-
-def test_a_deleted_recording_never_replaces_a_newer_one(kept, edge, refused):
-    wrong = kept / "wrong.npz"
-    edge("label", wrong, "--delete", "--yes")
-    shutil.copy(kept / "sure.npz", wrong)
-    newer = wrong.read_bytes()
-    err = refused("label", kept, "--undo")
-    assert "wrong.npz: exists again; rename it, and undo then" in err
-    assert wrong.read_bytes() == newer
-    wrong.rename(kept / "newer.npz")
-    assert edge("label", kept, "--undo")[0] == 0
-    assert len(find([str(kept)])) == 5
-
-
 def test_that_no_touch_is_of_a_kind_is_said(kept, edge):
     status, _, err = edge("label", kept / "sure.npz", "--only", "wrong")
     assert status == 1
     assert "none of 1 recording is of this kind" in err
 
 
-@pytest.mark.parametrize(
-    "name", [".edge-classify-undo.json", ".edge-classify-labels.json"]
-)
-@pytest.mark.parametrize("text", ["[1]", '[["a.npz", 5]]', "{}x", "7"])
-def test_a_damaged_journal_is_one_sentence(kept, name, text, refused):
-    (kept / name).write_text(text)
-    undo = ("--undo",) if "undo" in name else ()
-    err = refused("label", kept, *undo)
-    assert name in err
-    assert err.count("\n") == 1
-
-
-def test_undo_of_a_folder_that_is_not_there_changes_nothing_beside_it(
-    kept,
-    edge,
-    refused,
+def test_all_that_have_a_label_get_another_and_slips_are_told_with_their_files(
+    make_touch, tmp_path, edge
 ):
-    edge("label", kept, "--accept", "--yes")
+    for number in range(9):
+        name = "cupp" if number < 1 else "cup"
+        save(tmp_path / f"{number}.npz", make_touch(labels={"object": name}))
+    err = edge("label", tmp_path)[2]
+    slip = f"'cupp': is it 'cup'? (1 of 9 recordings: {tmp_path / '0.npz'})"
+    assert slip in err
+    lines = edge(
+        "label", tmp_path, "--only", "object=cupp", "--set", "object=cup", "--yes"
+    )
+    assert [line["file"] for line in lines[1]] == [str(tmp_path / "0.npz")]
+    assert {load(path).labels["object"] for path in find([str(tmp_path)])} == {"cup"}
+
+
+def test_a_word_of_only_that_is_no_state_or_task_is_refused(kept, refused):
+    err = refused("label", kept, "--only", "softnes=soft")
+    assert "unsure, wrong, unlabelled, left_out, object, softness, or TASK=LABEL" in err
+
+
+def test_what_is_left_out_is_listed_so_and_put_back(kept, edge):
+    edge("label", kept / "sure.npz", "--leave-out", "--yes")
+    assert len(find([str(kept)])) == 3
+    (line,) = edge("label", kept, "--only", "left_out")[1]
+    assert line["kinds"] == ["unlabelled", "left_out"]
+    edge("label", kept, "--put-back", "--yes")
+    assert len(find([str(kept)])) == 4
+
+
+def test_each_recording_gets_its_row_for_a_spreadsheet(kept, edge):
+    edge("label", kept, "--rows", "--yes")
+    rows = (kept / TABLE).read_text("utf-8-sig").splitlines()
+    assert rows[0] == "file,softness,left_out"
+    assert rows[-1] == "wrong.npz,soft,"
+    (kept / TABLE).write_text("file;softness\nwrong.npz;hard\n", "utf-8-sig")
+    assert edge("label", kept / "wrong.npz")[1][0]["labels"] == {"softness": "hard"}
+
+
+def test_the_last_change_is_taken_back_in_all_of_its_folders(kept, edge, make_touch):
+    save(kept / "more" / "a.npz", make_touch())
+    edge("label", kept / "wrong.npz", "--set", "softness=firm", "--yes")
+    edge("label", kept, "--set", "softness=squashy", "--yes")
+    status, _, err = edge("label", kept, "--undo")
+    assert status == 0
+    assert err.count("is as before `edge-classify label") == 2
+    labels = {path.stem: load(path).labels for path in find([str(kept)])}
+    assert labels["wrong"] == {"softness": "firm"}
+    assert "softness" not in labels["a"]
+    edge("label", kept, "--undo")
+    assert load(kept / "wrong.npz").labels == {"softness": "soft"}
+    assert edge("label", kept, "--undo")[0] == 2
+
+
+def test_what_reads_leaves_a_folder_of_a_former_release_as_it_is_and_names_it(
+    kept, edge
+):
+    change = '{"labels": {"sure.npz": [{}, null]}}'
+    (kept / ".edge-classify-labels.json").write_text(change)
+    (kept / ".edge-classify-deleted").mkdir()
+    (kept / TABLE).write_text("file,object\ngone.npz,cup\n")
+    before = sorted(kept.rglob("*"))
+    err = edge("label", kept)[2]
+    assert sorted(kept.rglob("*")) == before
+    assert ".edge-classify-labels.json: a change of labels" in err
+    assert ".edge-classify-deleted: recordings that a former release deleted" in err
+    assert "labels.csv, line 2: there is no gone.npz here" in err
+
+
+def test_undo_takes_a_folder(kept, refused):
     err = refused("label", kept / "mistyped", "--undo")
     assert "mistyped: --undo takes the folder of the recordings" in err
-    assert load(kept / "sure.npz").labels

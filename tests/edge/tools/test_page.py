@@ -1,6 +1,7 @@
 """The live page shows frames, contacts and decisions, and relabels and deletes
 trials."""
 
+import os
 from dataclasses import replace
 
 import numpy as np
@@ -10,6 +11,7 @@ import edge
 from edge import demo
 from edge.errors import InputError
 from edge.events import Decided, Onset
+from edge.labels import TABLE
 from edge.touch.frame import Frame
 from tests.edge.tools.conftest import TOUCH, frames
 
@@ -84,8 +86,34 @@ def test_a_decision_comes_with_the_nearest_training_trials_and_their_distances(
     assert distances == tuple(decided.decision.distances.round(3).tolist())
 
 
+SEEN = {"labels": {}, "left_out": False}
+
+
 def act(page, kind, **more):
     return page._act({"do": kind, **more})
+
+
+def change(page, kind, *names, **more):
+    """An action upon touches as a browser shows them, all where none is named."""
+    touches = [it for it in listed(page) if not names or it["file"] in names]
+    act(page, kind, touches=touches, **more)
+
+
+def listed(page, **asked):
+    return act(page, "trials", **asked)["trials"]
+
+
+def files(page, **asked):
+    return [touch["file"] for touch in listed(page, **asked)]
+
+
+def undo(page):
+    act(page, "undo", time=last(page)[0]["time"])
+
+
+def last(page):
+    """The change that can be undone."""
+    return act(page, "trials")["undo"]
 
 
 def test_labels_and_recording_are_set_from_the_page(page):
@@ -108,8 +136,10 @@ def test_labels_and_recording_are_set_from_the_page(page):
         {"do": "labels"},
         {"do": "labels", "labels": {"object": 3}},
         {"do": "labels", "labels": {"object": "a\nb"}},
-        {"do": "relabel", "files": ["../model.onnx"], "labels": {"object": "box"}},
-        {"do": "delete"},
+        {"do": "relabel", "touches": [], "labels": {"object": ""}},
+        {"do": "relabel", "touches": [{"file": 5}], "labels": {"object": "box"}},
+        {"do": "leave_out", "touches": [{**SEEN, "file": "../model.onnx"}]},
+        {"do": "leave_out"},
     ],
 )
 def test_an_action_that_makes_no_sense_is_refused(page, action):
@@ -133,12 +163,21 @@ def test_without_any_label_nothing_is_recorded(serve):
     assert not page.recording
 
 
+def test_recording_waits_for_the_choice_of_a_label(serve):
+    page = serve(labels={"object": "box", "softness": None})
+    with pytest.raises(InputError, match="give softness first"):
+        act(page, "record", on=True)
+    act(page, "labels", labels={"softness": "soft"})
+    assert page.recording
+    assert page.labels == {"object": "box", "softness": "soft"}
+
+
 def test_a_page_without_a_folder_changes_nothing(serve):
     with pytest.raises(InputError, match="record --web"):
         act(serve(folder=None), "trials")
 
 
-SPONGE = {"files": ["a.npz"], "labels": {"object": "sponge"}}
+SPONGE = {"labels": {"object": "sponge"}}
 
 
 @pytest.fixture
@@ -151,37 +190,73 @@ def folder_page(tmp_path, serve):
 
 
 def test_a_damaged_recording_is_named_and_left_out(folder_page):
-    assert sorted(folder_page._trials) == ["a.npz", "b.npz"]
+    assert sorted(files(folder_page)) == ["a.npz", "b.npz"]
     folder_page.look()
     (notice,) = folder_page._notices
     assert "c.npz" in notice
     assert "skips it" in notice
 
 
-@pytest.mark.parametrize("action", ["relabel", "delete"])
-def test_the_last_action_is_undone(folder_page, tmp_path, action):
-    path = tmp_path / "a.npz"
-    before = path.read_bytes()
-    act(folder_page, action, **SPONGE)
-    relabelled = {**TOUCH.labels, "object": "sponge"}
-    assert not path.exists() or edge.load(path).labels == relabelled
-    assert path.exists() == (action == "relabel")
-    act(folder_page, "undo")
-    assert path.read_bytes() == before
-    assert "a.npz" in folder_page._trials
-    with pytest.raises(InputError, match="nothing to undo"):
-        act(folder_page, "undo")
+def test_the_last_change_is_undone_unless_it_is_another_than_was_shown(folder_page):
+    change(folder_page, "relabel", "a.npz", **SPONGE)
+    shown = last(folder_page)
+    change(folder_page, "leave_out", "b.npz")
+    with pytest.raises(InputError, match="have been changed since"):
+        act(folder_page, "undo", time=shown[0]["time"])
+    undo(folder_page)
+    assert last(folder_page) == shown
+    assert shown[0]["command"] == "relabel a.npz object=sponge"
+    undo(folder_page)
+    assert last(folder_page) == []
+    assert [touch["labels"] for touch in listed(folder_page)] == [TOUCH.labels] * 2
 
 
-def test_a_trial_that_is_gone_takes_no_former_change_away(folder_page, tmp_path):
-    before = (tmp_path / "a.npz").read_bytes()
-    act(folder_page, "relabel", **SPONGE)
-    (tmp_path / "b.npz").unlink()
-    with pytest.raises(InputError, match="cannot be read: No such file"):
-        act(folder_page, "delete", files=["b.npz"])
-    assert "b.npz" in folder_page._trials
-    act(folder_page, "undo")
-    assert (tmp_path / "a.npz").read_bytes() == before
+def test_what_is_left_out_stays_in_the_list_and_is_put_back(folder_page, tmp_path):
+    change(folder_page, "leave_out", "a.npz")
+    assert folder_page.left_out([tmp_path / "a.npz", tmp_path / "b.npz"]) == 1
+    assert files(folder_page, only="left_out") == ["a.npz"]
+    change(folder_page, "put_back", "a.npz")
+    assert files(folder_page, only="left_out") == []
+
+
+def test_an_old_form_does_not_overwrite_what_another_has_written(folder_page, tmp_path):
+    old = listed(folder_page)
+    change(folder_page, "relabel", "a.npz", **SPONGE)
+    with pytest.raises(InputError, match="a.npz: has been changed by `relabel a.npz o"):
+        act(folder_page, "relabel", touches=old, labels={"object": "box"})
+    labels = {path.stem: edge.load(path).labels for path in tmp_path.glob("[ab].npz")}
+    assert labels == {"a": TOUCH.labels | SPONGE["labels"], "b": TOUCH.labels}
+
+
+def test_fifty_touches_are_shown_at_a_time_the_newest_first(tmp_path, serve):
+    for number in range(60):
+        path = tmp_path / f"{number:02}.npz"
+        edge.save(path, TOUCH, lasting=False)
+        os.utime(path, (number, 100 - number))
+    page = serve(TOUCH.layout)
+    names = [f"{number:02}.npz" for number in range(60)]
+    assert files(page) == names[:50]
+    change(page, "relabel", *names[10:20], **SPONGE)
+    answer = act(page, "trials", only="object=sponge", start=3)
+    assert [touch["file"] for touch in answer["trials"]] == names[13:20]
+    assert answer["total"] == 10
+    assert answer["all"] == 60
+    assert ("object=foam block", 50) in answer["words"]
+
+
+def test_labels_that_another_program_changes_are_shown(folder_page, tmp_path):
+    (tmp_path / TABLE).write_text("file,object\na.npz,cup\n")
+    assert files(folder_page, only="object=cup") == ["a.npz"]
+    (tmp_path / TABLE).write_text("file,object\na.npz\n")
+    assert files(folder_page, only="object=cup") == ["a.npz"]
+    assert "line 2: has not the 2 cells" in folder_page._notices[-1]
+
+
+def test_of_two_objects_the_page_says_that_a_third_is_wanted(folder_page):
+    assert act(folder_page, "trials")["doubts"] == []
+    change(folder_page, "relabel", "a.npz", **SPONGE)
+    (sentence,) = act(folder_page, "trials")["doubts"]
+    assert sentence.startswith("record a third object")
 
 
 def test_a_kept_touch_has_its_course_its_decision_and_what_asks_for_a_look(kept_page):
@@ -194,37 +269,25 @@ def test_a_kept_touch_has_its_course_its_decision_and_what_asks_for_a_look(kept_
 
 
 def test_a_decision_is_accepted_and_corrected_with_undo(kept_page, touch_folder):
-    act(kept_page, "accept", files=["kept-1.npz"])
+    (touch,) = listed(kept_page)
+    assert touch["accepted"] == {"softness": "hard"}
+    change(kept_page, "accept")
     assert edge.load(touch_folder / "kept-1.npz").labels == {"softness": "hard"}
-    act(kept_page, "relabel", files=["kept-1.npz"], labels={"softness": "soft"})
-    (touch,) = act(kept_page, "trials")["trials"]
+    change(kept_page, "relabel", labels={"softness": "soft"})
+    (touch,) = listed(kept_page)
     assert touch["labels"] == {"softness": "soft"}
     assert touch["kinds"] == ["unsure", "wrong"]
-    act(kept_page, "undo")
+    assert touch["accepted"] == {}
+    undo(kept_page)
     assert edge.load(touch_folder / "kept-1.npz").labels == {"softness": "hard"}
 
 
-def test_a_touch_says_what_there_is_to_accept(kept_page):
-    (touch,) = act(kept_page, "trials")["trials"]
-    assert touch["accepted"] == {"softness": "hard"}
-    act(kept_page, "accept", files=["kept-1.npz"])
-    (touch,) = act(kept_page, "trials")["trials"]
-    assert touch["accepted"] == {}
-
-
-def test_several_touches_change_at_once_and_one_undo_takes_all_back(
-    kept_page, touch_folder, add_touch
-):
+def test_several_touches_change_at_once(kept_page, touch_folder, add_touch):
     add_touch()
-    names = files(kept_page)
-    act(kept_page, "relabel", files=names, labels={"object": "sponge"})
-    act(kept_page, "accept", files=names)
+    change(kept_page, "relabel", **SPONGE)
+    change(kept_page, "accept")
     both = {"object": "sponge", "softness": "hard"}
-    assert [edge.load(touch_folder / name).labels for name in names] == [both, both]
-    act(kept_page, "delete", files=names)
-    assert files(kept_page) == []
-    act(kept_page, "undo")
-    assert [edge.load(touch_folder / name).labels for name in names] == [both, both]
+    assert [touch["labels"] for touch in listed(kept_page)] == [both, both]
 
 
 def test_a_contradiction_and_a_slip_are_told_where_the_label_is(folder_page, tmp_path):
@@ -233,29 +296,24 @@ def test_a_contradiction_and_a_slip_are_told_where_the_label_is(folder_page, tmp
         edge.save(tmp_path / f"d{number}.npz", TOUCH)
     folder_page.look()
     wrong = {"object": "fom block", "category": "rigid-fixed"}
-    act(folder_page, "relabel", files=["a.npz"], labels=wrong)
+    change(folder_page, "relabel", "a.npz", labels=wrong)
     act(folder_page, "labels", labels={"object": "Foam block"})
-    listed = act(folder_page, "trials")
-    names = [touch["file"] for touch in listed["trials"]]
-    doubts = dict(zip([*names, "next"], listed["doubts"], strict=True))
+    answer = act(folder_page, "trials")
+    doubts = {touch["file"]: touch["doubts"] for touch in answer["trials"]}
     assert doubts["a.npz"] == [
         "category='rigid-fixed' contradicts softness and mobility, which say "
         "'soft-fixed'",
         "object='fom block': is it 'foam block'?",
     ]
     assert doubts["b.npz"] == []
-    assert doubts["next"] == ["object='Foam block': is it 'foam block'?"]
-
-
-def files(page):
-    return [touch["file"] for touch in act(page, "trials")["trials"]]
+    assert answer["doubts"][0] == "object='Foam block': is it 'foam block'?"
 
 
 def test_touches_that_come_into_the_folder_are_shown(
     kept_page, touch_folder, add_touch
 ):
     add_touch()
-    assert files(kept_page) == ["kept-1.npz", "kept-2.npz"]
+    assert files(kept_page) == ["kept-2.npz", "kept-1.npz"]
     (touch_folder / "kept-1.npz").unlink()
     assert files(kept_page) == ["kept-2.npz"]
 
@@ -263,7 +321,7 @@ def test_touches_that_come_into_the_folder_are_shown(
 def test_a_picture_tells_when_the_list_has_changed(folder_page, pictures):
     still = Frame(0.0, np.zeros(TOUCH.layout.shape, np.uint16))
     folder_page.push(still)
-    act(folder_page, "delete", files=["a.npz"])
+    change(folder_page, "leave_out", "a.npz")
     folder_page.push(replace(still, t=1.0))
     before, after = (picture["trials"] for picture in pictures)
     assert after > before

@@ -1,5 +1,6 @@
 """What a person sees and does on the live page, in Chromium."""
 
+import re
 from contextlib import ExitStack
 
 import pytest
@@ -130,13 +131,17 @@ def test_new_touches_move_neither_rows_nor_focus(kept_page, add_touch, view):
     height = button.rect["y"]
     add_touch()
     kept_page.look()
-    shown.has(f"{ROWS}.length === 2")
+    shown.has("list.all === 2")
     assert shown.browser.switch_to.active_element == button
     assert button.rect["y"] == height
     shown.press("Accept")
     shown.has(f"{ROWS}[0].textContent.includes('softness=hard')")
     assert shown.js("document.activeElement.closest('li').dataset.file") == (
         "kept-1.npz"
+    )
+    shown.js("document.activeElement.blur()")
+    shown.has(
+        f"[...{ROWS}].map(row => row.dataset.file).join() === 'kept-2.npz,kept-1.npz'"
     )
 
 
@@ -169,9 +174,11 @@ def test_a_kept_touch_is_filtered_corrected_and_undone(kept_page, touch_folder, 
     text = shown.js(f"{ROWS}[0].textContent")
     assert "softness: hard (55 %, short)" in text
     assert "unsure" in text
+    shown.has("document.getElementById('filter').options.length > 4")
     narrow("wrong")
     shown.has(f"{ROWS}.length === 0")
     narrow("")
+    shown.has(f"{ROWS}.length === 1")
     shown.press("Correct")
     assert violations(shown.browser) == []
     shown.write("body", "1")
@@ -179,8 +186,28 @@ def test_a_kept_touch_is_filtered_corrected_and_undone(kept_page, touch_folder, 
     shown.press("Save")
     shown.until(lambda: labels() == {"softness": "soft"})
     shown.has("document.getElementById('undo').offsetParent !== null")
-    shown.press("Undo the change of kept-1.npz")
+    narrow("softness=soft")
+    shown.has(f"{ROWS}.length === 1")
+    shown.press("Undo: relabel kept-1.npz softness=soft")
     shown.until(lambda: labels() == {})
+
+
+def test_of_two_people_the_second_learns_what_the_first_has_written(
+    kept_page, touch_folder, view
+):
+    first = view(kept_page)
+    second = view(kept_page)
+    for shown in (first, second):
+        shown.has(f"{ROWS}.length === 1")
+        shown.press("Correct")
+    for shown, name in ((first, "soft"), (second, "hard")):
+        shown.write(".editor [aria-label='new label for softness']", name)
+        shown.press("Save")
+        first.until(lambda: edge.load(touch_folder / "kept-1.npz").labels)
+    second.has("!document.getElementById('error').hidden")
+    assert "softness soft" in re.sub(r"\W+", " ", second.js("$('error').textContent"))
+    second.has(f"{ROWS}[0].textContent.includes('softness=soft')")
+    assert edge.load(touch_folder / "kept-1.npz").labels == {"softness": "soft"}
 
 
 def test_a_message_goes_by_a_press_or_after_a_while(page, view):

@@ -273,7 +273,7 @@ def test_a_contact_that_the_end_cuts_off_is_not_saved_while_the_page_does_not_re
 
 def test_a_trial_has_the_labels_that_held_when_its_touch_began(tmp_path):
     begun = SimpleNamespace(under_way=False)
-    page = SimpleNamespace(recording=True, saved=lambda path, trial: None)
+    page = SimpleNamespace(recording=True, saved=lambda: None)
     page.labels = {"object": "box"}
     with recorder(tmp_path, page=page) as mine:
         mine.follow(begun)
@@ -315,7 +315,7 @@ def test_a_trial_keeps_what_a_model_said_of_its_touch(edge, tmp_path):
     assert trial.labels == {"object": "cushion"}
     assert trial.meta["decided"]["object"]["label"] == "pillow"
     assert "arm" in trial.meta
-    assert "wrong" in review.kinds(trial.meta)
+    assert "wrong" in review.kinds(trial.meta, trial.labels)
 
 
 def test_a_model_brings_the_arm_that_it_needs(refused, tmp_path):

@@ -1,10 +1,13 @@
 """What asks for a look at a touch, and its course in a few numbers."""
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 
+from edge.errors import InputError
+from edge.labels import Standing
 from edge.tools import review
 from tests.edge.tools.kept import kept_meta
 
@@ -29,33 +32,36 @@ HALVES = {"softness": "soft", "mobility": "fixed"}
     ],
 )
 def test_a_touch_is_unsure_wrong_or_unlabelled(meta, kinds):
-    assert review.kinds(meta) == kinds
+    assert review.kinds(meta, meta["labels"]) == kinds
 
 
 def test_what_is_unknown_or_out_of_range_is_not_accepted():
     meta = kept_meta({}, a=("x", 0.9), b=("unknown", 0.9), c=(None, None))
-    assert review.accepted(meta) == {"a": "x"}
+    assert review.accepted(meta, {}) == {"a": "x"}
 
 
 def test_what_a_person_has_labelled_is_not_accepted_otherwise():
-    meta = kept_meta({"a": "y"}, a=("x", 0.9), b=("z", 0.9))
-    assert review.accepted(meta) == {"b": "z"}
+    meta = kept_meta({}, a=("x", 0.9), b=("z", 0.9))
+    assert review.accepted(meta, {"a": "y"}) == {"b": "z"}
 
 
 def test_what_is_accepted_contradicts_no_label_of_a_person():
-    meta = kept_meta(HALVES, category=("rigid-fixed", 0.9))
-    assert review.accepted(meta) == {}
-    meta = kept_meta(
-        {"softness": "soft"}, category=("rigid-fixed", 0.9), mobility=("fixed", 0.9)
-    )
-    assert review.accepted(meta) == {"mobility": "fixed"}
+    meta = kept_meta({}, category=("rigid-fixed", 0.9), mobility=("fixed", 0.9))
+    assert review.accepted(meta, HALVES) == {}
+    assert review.accepted(meta, {"softness": "soft"}) == {"mobility": "fixed"}
 
 
-def test_a_recording_is_selected_by_all_words():
-    meta = kept_meta({"b": "z"}, a=("x", 0.5))
-    assert review.selected(meta, [])
-    assert review.selected(meta, ["unsure", "a", "b"])
-    assert not review.selected(meta, ["unsure", "c"])
+def touched(meta, labels):
+    return review.Touch(Path("a.npz"), meta, Standing(labels), "a.npz")
+
+
+def test_a_recording_is_selected_by_its_kinds_tasks_and_labels():
+    touch = touched(kept_meta({}, a=("x", 0.5)), {"b": "z"})
+    assert touch.words == {"unsure", "unlabelled", "a", "b", "b=z"}
+    assert review.selected([touch], ["unsure", "a", "b=z"]) == [touch]
+    assert review.selected([touch], ["left_out", "b=anything"]) == []
+    with pytest.raises(InputError, match="unlabelled, left_out, a, b, or TASK=LABEL"):
+        review.selected([touch], ["unsur"])
 
 
 def test_a_course_is_in_percent_of_its_highest_and_misses_no_peak(make_touch):
@@ -84,4 +90,4 @@ def test_a_course_is_in_percent_of_its_highest_and_misses_no_peak(make_touch):
 def test_what_is_no_decision_is_left_out(answer):
     meta = {"decided": {"object": answer}}
     assert review.decisions(meta) == {}
-    assert review.kinds(meta) == ["unlabelled"]
+    assert review.kinds(meta, {}) == ["unlabelled"]

@@ -11,6 +11,10 @@ def trials(counts):
     return [{"object": name} for name, count in counts.items() for _ in range(count)]
 
 
+def places(labels):
+    return [f"{number}.npz" for number in range(len(labels))]
+
+
 @pytest.mark.parametrize(
     ("meant", "label", "counts"),
     [
@@ -29,10 +33,12 @@ def test_a_rare_label_that_is_spelled_like_a_frequent_one_is_named(
     counts,
 ):
     labels = trials(dict(zip((meant, label), counts, strict=True)))
+    where = ", ".join([*places(labels)[counts[0] :][:3], *["..."] * (counts[1] > 3)])
     sentence = (
-        f"object={label!r} on {counts[1]} of {sum(counts)} recordings; is it {meant!r}?"
+        f"object={label!r}: is it {meant!r}? ({counts[1]} of {sum(counts)} recordings: "
+        f"{where})"
     )
-    assert slips(labels) == [sentence]
+    assert slips(labels, places(labels)) == [sentence]
 
 
 @pytest.mark.parametrize(
@@ -46,27 +52,30 @@ def test_a_rare_label_that_is_spelled_like_a_frequent_one_is_named(
     ],
 )
 def test_labels_that_are_meant_are_no_slips(counts):
-    assert slips(trials(counts)) == []
+    labels = trials(counts)
+    assert slips(labels, places(labels)) == []
 
 
 def test_a_label_with_one_trial_is_named():
     labels = trials({"box": 5, "tree": 1})
-    assert slips(labels) == ["object='tree' on a single recording"]
+    (sentence,) = slips(labels, places(labels))
+    assert sentence == "object='tree' stands alone (1 of 6 recordings: 5.npz)"
 
 
 def test_a_task_that_nearly_all_trials_lack_is_named_with_what_is_meant():
     labels = [{"category": "soft-fixed"}] * 55 + [{"categroy": "soft-fixed"}]
-    assert slips(labels)[0] == (
-        "task 'categroy' on 1 of 56 recordings; is it 'category'?"
+    assert slips(labels, places(labels))[0] == (
+        "task 'categroy': is it 'category'? (1 of 56 recordings: 55.npz)"
     )
 
 
 def test_a_category_that_contradicts_softness_and_mobility_is_named():
     right = {"category": "soft-fixed", "softness": "soft", "mobility": "fixed"}
     wrong = {**right, "softness": "rigid"}
-    assert slips([right] * 9 + [wrong] * 3)[0] == (
+    labels = [right] * 9 + [wrong] * 3
+    assert slips(labels, places(labels))[0] == (
         "category='soft-fixed' contradicts softness and mobility, which say "
-        "'rigid-fixed', on 3 of 12 recordings"
+        "'rigid-fixed' (3 of 12 recordings: 9.npz, 10.npz, 11.npz)"
     )
 
 
@@ -82,5 +91,6 @@ def test_hundreds_of_labels_are_not_compared_with_each_other(monkeypatch):
     """That takes minutes where a file has thousands."""
     compared = []
     monkeypatch.setattr(module, "_alike", lambda *names: compared.append(names))
-    assert slips([{"object": "x" * i} for i in range(1, 502)]) == []
+    labels = [{"object": "x" * i} for i in range(1, 502)]
+    assert slips(labels, places(labels)) == []
     assert compared == []

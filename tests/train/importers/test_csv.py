@@ -248,12 +248,12 @@ RATE = ("--rate", "1")
         (
             {"1.txt": "1 2\n", "labels.csv": "trial,who\n2,me\n"},
             RATE,
-            "labels.csv: needs a column trial with names such as ['1']",
+            "labels.csv: needs a column file with names such as ['1']",
         ),
         (
             {"1.txt": "1 2\n", "labels.csv": "trial,object\n1,box\n1,cup\n"},
             RATE,
-            "labels.csv: 1 has two rows; remove one of them",
+            "labels.csv, line 3: 1 has line 2 too; remove one of them",
         ),
         (
             {"all.csv": "trial,p1\n../1,2\n"},

@@ -94,6 +94,16 @@ def test_labels_of_no_file_and_files_without_labels_are_named(folder, capsys):
     assert "has no row for r1" in err
 
 
+def test_a_row_may_name_the_file_and_leave_it_out(folder):
+    labels = "file;object;left_out\nr0.csv;box;\nb/r1.csv;cup;\nr2.csv;cup;yes\n"
+    files = dict.fromkeys(("r0.csv", "b/r1.csv", "r2.csv"), TRIAL)
+    put(folder, files | {"labels.csv": labels})
+    status, recordings = imported(folder)
+    assert status == 0
+    labels = {name: trial.labels["object"] for name, trial in recordings.items()}
+    assert labels == {"r0": "box", "b_r1": "cup"}
+
+
 def test_a_row_of_a_file_that_is_not_imported_is_no_slip(folder, capsys):
     files = {"r0.csv": TRIAL, "r1.csv": b"\0", "r2.csv": "t,p1\n0,x\n"}
     labels = "trial,object\nr0,box\nr1,cup\nr2,cup\n"

@@ -51,7 +51,7 @@ def test_flattering_data_and_left_out_recordings_get_a_warning(
     options = {"features": ["paper"], "projection": "pca", "window_s": 9.0}
     text = "\n".join(warnings(train.fit(paths, **options, jobs=1)))
     assert "warning: no contact above 150 counts, so counted as wrong: " in text
-    assert "python -m train thresholds" in text
+    assert "edge-classify thresholds" in text
     assert "recordings are skipped for lack of a label for object: " in text
     ends = "every recording ends within 1.59 s of the onset"
     assert f"the window of 9 s is too long: {ends}" in text
