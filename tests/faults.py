@@ -18,7 +18,7 @@ from dataclasses import dataclass, replace
 from itertools import count
 
 import numpy as np
-from joblib import Parallel, delayed
+from joblib import delayed
 
 from edge.chips import block
 from edge.chips.chip import ChipSpec
@@ -32,7 +32,7 @@ from tests.bench import tables
 from tests.bench.program import start
 from tests.faulty import Fault, Route, faulty_buses, one_bus
 from tests.serial_line import LineBus
-from train.progress import bar
+from train.threads import in_processes
 
 OVERHEADS_US = (0.0, 50.0, 100.0)
 """Microseconds a transaction."""
@@ -426,7 +426,7 @@ def sweeps(overhead_s, every):
 def shares():
     """Print the table of `SHARES`; the rows that break a promise."""
     jobs = [delayed(share)(kind, rate) for kind in SHARES for rate in LEAST_VALID]
-    outcomes = iter(Parallel(n_jobs=-1)(bar(jobs, desc="shares", unit=" shares")))
+    outcomes = in_processes(-1, jobs, "shares")
     rows = []
     broken = []
     for kind in SHARES:
@@ -451,7 +451,7 @@ def measure(every):
         words = f"{overhead_us:g} us"
         overhead_s = overhead_us * 1e-6
         jobs = [*plays(overhead_s), *sweeps(overhead_s, every)]
-        outcomes = Parallel(n_jobs=-1)(bar(jobs, desc=words, unit=" scripts"))
+        outcomes = list(in_processes(-1, jobs, words))
         print(f"\nOverhead of {words} a transaction:\n")
         print(tables.markdown([outcome.row() for outcome in outcomes]), flush=True)
         for outcome in outcomes:
