@@ -1,13 +1,14 @@
 """How the skin takes the faults of its wires, judged by the counts that its chips
 really felt.
 
-`python -m tests.faults` prints tables. Scripts of faults, and the loss of all settings
-between two frames, are played onto fake skins in virtual time, which advances with the
-bits on the wire and with the software's overhead for each transaction. Then one fault of
-each kind is played at every transaction of a frame and of the set-up; `--every 10` takes
-every tenth. The exit status is 1 if a valid value is wrong, or a taxel is not valid again
-within half a second of the fault's end. The tests of `edge.skin.bus_reader` play a part
-of this.
+`python -m tests.faults` prints tables. The first has the share of valid frames by the
+share of faults, for each kind of bus. Then scripts of faults, and the loss of all
+settings between two frames, are played onto fake skins in virtual time, which advances
+with the bits on the wire and with the software's overhead for each transaction. Last, one
+fault of each kind is played at every transaction of a frame and of the set-up; `--every
+10` takes every tenth. The exit status is 1 if fewer frames are valid than `LEAST_VALID`
+asks for, a valid value is wrong, or a taxel is not valid again within half a second of
+the fault's end. The tests of `edge.skin.bus_reader` play a part of this.
 """
 
 import errno
@@ -17,12 +18,12 @@ from dataclasses import dataclass, replace
 from itertools import count
 
 import numpy as np
-from joblib import Parallel, delayed
+from joblib import delayed
 
 from edge.chips import block
 from edge.chips.chip import ChipSpec
 from edge.fake.clock import VirtualClock
-from edge.fake.player import calibrated
+from edge.fake.player import calibrated, fake_buses
 from edge.skin import file as skinfile
 from edge.skin.loop import Schedule, Stop
 from edge.skin.skin import Skin
@@ -30,7 +31,8 @@ from edge.skin.wiring import BusSpec
 from tests.bench import tables
 from tests.bench.program import start
 from tests.faulty import Fault, Route, faulty_buses, one_bus
-from train.progress import bar
+from tests.serial_line import LineBus
+from train.threads import in_processes
 
 OVERHEADS_US = (0.0, 50.0, 100.0)
 """Microseconds a transaction."""
@@ -44,6 +46,10 @@ REPEATED = (3, 20, 37, 54)
 """Frames before which all chips lose their settings, where that repeats."""
 INTACT_FRAMES = 12
 """A sweep goes on for so many frames after the last invalid taxel."""
+LEAST_VALID = {0.01: 0.98, 0.05: 0.95, 0.2: 0.75, 1.0: 0.0}
+"""Share of valid frames of a chip, by the share of its transactions that fail."""
+LEAST_BESIDE = 0.95
+"""The same of the other chips, beside one that always hangs."""
 CODES = (errno.EREMOTEIO, errno.EIO, errno.ETIMEDOUT, errno.EAGAIN, errno.ENODEV)
 KINDS = {
     errno.errorcode[code]: Fault(code=code)
@@ -76,10 +82,44 @@ def skins():
         "mpr121": pad,
         "one bus": single,
         "block": replace(cody, buses=buses),
+        "serial": calibrated(skinfile.load(skinfile.shipped("matrix"))),
     }
 
 
 SKINS = skins()
+ONE_CHIP = {"address": 0x2D, "mux": 0x70, "channel": 1, "bus": "/dev/i2c-1"}
+PAD_CHIP = {"address": 0x5B, "channel": 0}
+SHARES = {
+    "NACK of one AD7147": ("cody", Fault(**ONE_CHIP)),
+    "EIO of one AD7147": ("cody", Fault(code=errno.EIO, **ONE_CHIP)),
+    "timeouts of one AD7147": ("cody", Fault(code=errno.ETIMEDOUT, **ONE_CHIP)),
+    "NACK on a bus of AD7147": ("cody", Fault(bus="/dev/i2c-1")),
+    "EIO on a bus of AD7147": ("cody", Fault(code=errno.EIO, bus="/dev/i2c-1")),
+    "NACK of one MPR121": ("mpr121", Fault(**PAD_CHIP)),
+    "EIO of one MPR121": ("mpr121", Fault(code=errno.EIO, **PAD_CHIP)),
+    "timeouts of one MPR121": ("mpr121", Fault(code=errno.ETIMEDOUT, **PAD_CHIP)),
+    "NACK of one block": ("block", Fault(bus="/dev/i2c-1")),
+    "EIO of one block": ("block", Fault(code=errno.EIO, bus="/dev/i2c-1")),
+    "timeouts of one block": ("block", Fault(code=errno.ETIMEDOUT, bus="/dev/i2c-1")),
+    "flipped bits of one block": ("block", Fault("flip", bus="/dev/i2c-1")),
+    "cut answers of a serial port": ("serial", Fault("break")),
+}
+"""The skin and the fault of each row of the first table."""
+
+
+@dataclass(frozen=True)
+class Share:
+    """Valid frames of all that were due, ticks left out among them.
+
+    Attributes:
+        valid: of the chips that faults met.
+        beside: of the other chips; NaN without any.
+        read: of the frames that were read, the chips that faults met.
+    """
+
+    valid: float
+    beside: float
+    read: float
 
 
 class Pattern:
@@ -241,6 +281,42 @@ def run(name, file, faults=(), *, resets=(), seconds=LASTS_S, overhead_s=0.0):
     return watched.outcome(name, met, end, schedule.missed_ticks)
 
 
+def share(kind, rate, *, seconds=20.0, overhead_s=50e-6):
+    """Play a kind of `SHARES` at a rate on chips that have run well for a second."""
+    name, fault = SHARES[kind]
+    file = SKINS[name]
+    faults = [replace(fault, rate=rate)]
+    clock = VirtualClock()
+    feels = Pattern(file)
+    if file.buses[0].serial:
+        buses = fake_buses(file, feels, clock, make=LineBus)
+        buses[0].plug(file.chips[0].traits.frame_bytes)
+    else:
+        buses = faulty_buses(file, feels, clock, timed=True, overhead_s=overhead_s)
+    met = np.zeros(file.layout.shape, dtype=bool)
+    for bus in file.buses:
+        for chip in bus.chips:
+            met.flat[list(chip.taxels)] = touches(faults[0], bus, chip)
+    valid = []
+    first = 100
+    with Skin(file, buses, clock=clock) as skin:
+        skin.start()
+        schedule = Schedule(clock, skin.period_s)
+        while schedule.tick < first + seconds / skin.period_s:
+            schedule.wait(Stop())
+            frame = skin.read()
+            if schedule.tick == first:
+                for bus in buses:
+                    bus.inject(faults)
+            elif schedule.tick > first:
+                assert feels.wrong(frame) == 0
+                valid.append(frame.valid)
+    ticks = schedule.tick - first
+    good = sum(v[met].all() for v in valid)
+    beside = math.nan if met.all() else sum(v[~met].all() for v in valid) / ticks
+    return Share(good / ticks, beside, good / len(valid))
+
+
 def sweep(name, file, fault, *, set_up=False, every=1, first=0, overhead_s=0.0):
     """Play one fault at each transaction of four frames, or of the set-up, on every
     bus.
@@ -347,15 +423,35 @@ def sweeps(overhead_s, every):
                 yield delayed(sweep)(words, file, fault, set_up=set_up, **options)
 
 
-def measure(every):
-    """Play all scripts and sweeps with each overhead, and print their tables; 1 if a
-    promise is broken."""
+def shares():
+    """Print the table of `SHARES`; the rows that break a promise."""
+    jobs = [delayed(share)(kind, rate) for kind in SHARES for rate in LEAST_VALID]
+    outcomes = in_processes(-1, jobs, "shares")
+    rows = []
     broken = []
+    for kind in SHARES:
+        row = {"fault": kind}
+        for rate, least in LEAST_VALID.items():
+            outcome = next(outcomes)
+            row[f"valid at {rate:.0%}"] = f"{outcome.valid:.1%}"
+            if outcome.valid < least or (rate == 1.0 and outcome.beside < LEAST_BESIDE):
+                broken.append(f"{kind} at {rate:.0%}")
+        row["others, at 100%"] = f"{outcome.beside:.1%}"
+        rows.append(row)
+    print("\nFrames of which the faulty chip is valid, of all that were due:\n")
+    print(tables.markdown(rows), flush=True)
+    return broken
+
+
+def measure(every):
+    """Print the shares, and play all scripts and sweeps with each overhead, a table
+    each; 1 if a promise is broken."""
+    broken = shares()
     for overhead_us in OVERHEADS_US:
         words = f"{overhead_us:g} us"
         overhead_s = overhead_us * 1e-6
         jobs = [*plays(overhead_s), *sweeps(overhead_s, every)]
-        outcomes = Parallel(n_jobs=-1)(bar(jobs, desc=words, unit=" scripts"))
+        outcomes = list(in_processes(-1, jobs, words))
         print(f"\nOverhead of {words} a transaction:\n")
         print(tables.markdown([outcome.row() for outcome in outcomes]), flush=True)
         for outcome in outcomes:

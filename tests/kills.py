@@ -193,7 +193,7 @@ def before_calibration(folder):
 
 def calibrating(folder):
     skin = ("--skin", folder / "skin.toml", "--fake", folder / "still.npz")
-    return [*EDGE, "calibrate", *skin, "--frames", 20]
+    return [*EDGE, "calibrate", *skin, "--frames", 20, "--yes"]
 
 
 def calibrated(folder, printed):

@@ -1,16 +1,22 @@
 """Several processes, each with one thread for linear algebra: on matrices as small as
 ours several threads are slower."""
 
+import os
 import signal
+import time
 from collections.abc import Iterator, Sequence
 from functools import cache
 from multiprocessing import resource_tracker
+from threading import Thread
 from typing import Any
 
 from joblib import Parallel
 from threadpoolctl import ThreadpoolController
 
 from train.progress import bar
+
+WATCHED_EVERY_S = 0.5
+"""Between two looks at whether the parent still runs."""
 
 
 @cache
@@ -24,6 +30,21 @@ def single_thread() -> Any:
     return _controller().limit(limits=1)
 
 
+def _end_with(parent: int) -> None:
+    """End this process soon after its parent has, by whatever signal.
+
+    Linux alone can send a signal then, and sends it for the thread that began the
+    process.
+    """
+
+    def watch() -> None:
+        while os.getppid() == parent:
+            time.sleep(WATCHED_EVERY_S)
+        os._exit(1)
+
+    Thread(target=watch, daemon=True).start()
+
+
 def in_processes(
     jobs: int,
     calls: Sequence[Any],
@@ -34,10 +55,12 @@ def in_processes(
 
     With a heading, a bar shows how many are there.
 
-    Ctrl-C ends this process, which ends the others: those that begin here never get the
-    signal, which would print their tracebacks. The options are those of joblib.
+    The others end when this process does, by whatever signal. Those that begin here
+    never get that of Ctrl-C, which would print their tracebacks. The options are those
+    of joblib.
     """
-    run = Parallel(n_jobs=jobs, return_as="generator", **options)
+    watched = {"initializer": _end_with, "initargs": (os.getpid(),)}
+    run = Parallel(n_jobs=jobs, return_as="generator", **watched, **options)
     can_block = hasattr(signal, "pthread_sigmask")  # Windows cannot
     if can_block:
         resource_tracker.ensure_running()  # its start would end the block

@@ -34,7 +34,7 @@ class BusError(EdgeError):
 
     Attributes:
         errno: the kernel's error number.
-        retries: how often the transaction is sent again within the same frame.
+        retries: how often the transaction is sent again, see `edge.bus.retrying`.
         remedy: the words that end the message.
     """
 
@@ -80,7 +80,6 @@ class BusBusy(BusError, OSError):
 class BusRefused(BusError, ValueError):
     """The adapter does not carry a transaction of this shape (EOPNOTSUPP, EINVAL)."""
 
-    retries = 1
     remedy = "the adapter refuses a transaction of this shape"
 
 

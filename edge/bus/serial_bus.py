@@ -33,6 +33,9 @@ BOOT_S = 3.0
 PING_S = 0.1
 IDENTITY = b"\x00"
 """Pointer of the register that every microcontroller serves, see `edge.chips.block`."""
+GAP_S = 0.003
+"""An answer whose bytes stop coming for this time, and that of two bytes, was cut
+short."""
 LONGEST_PACKET = 16384
 """More bytes than this without a zero are noise."""
 OTHERS = "another program has the port open; close it"
@@ -151,7 +154,7 @@ class SerialBus:
     sleep = staticmethod(time.sleep)
 
     def reopen(self) -> None:
-        """Open the port unless it is open, and discard the bytes that have come.
+        """Open the port unless it is open.
 
         A port that did not answer is not closed: opening it restarts many boards.
 
@@ -165,7 +168,6 @@ class SerialBus:
             raise InputError(
                 f"{self.name}: needs pyserial; run `pip install pyserial`"
             ) from None
-        self._received.clear()
         try:
             if self._port is None:
                 self._port = serial.Serial(
@@ -175,7 +177,10 @@ class SerialBus:
                     write_timeout=self.timeout_s,
                     exclusive=True,
                 )
-            self._port.reset_input_buffer()
+                # FTDI's chips keep the end of an answer for 16 ms otherwise. Only Linux
+                # has the setting, and not for every port.
+                with suppress(AttributeError, ValueError):
+                    self._port.set_low_latency_mode(True)
         except (OSError, ValueError) as error:
             self.close()
             raise serial_error(
@@ -216,31 +221,37 @@ class SerialBus:
         `ends`."""
         self._tag = (self._tag + 1) % 256
         self._heard = False
+        # What came before the request is no answer to it.
+        self._received.clear()
+        self._port.read(self._port.in_waiting)
         self._port.write(encode(sealed(bytes([pointer, self._tag]))))
-        while self.now() < ends:
-            packet = self._packet(ends)
+        while (packet := self._packet(ends)) is not None:
             # An answer to an earlier request that came too late has another tag.
-            if packet is not None and packet[:1] == bytes([self._tag]):
+            if packet[:1] == bytes([self._tag]):
                 return packet[1:]
+            if self.now() > ends:
+                break
         return b""
 
     def _packet(self, ends: float) -> bytes | None:
-        """The data of the next packet; None if it is damaged, or none comes by the time
-        `ends`."""
-        while True:
+        """The data of the next packet, empty if it is damaged; None if the line falls
+        silent, or none comes by the time `ends`."""
+        while len(self._received) < LONGEST_PACKET:
             packet, zero, following = self._received.partition(b"\0")
             if zero:
                 self._received = following
-                return decode(bytes(packet))
-            if len(packet) > LONGEST_PACKET:
-                self._received.clear()
+                return decode(bytes(packet)) or b""
             seconds_left = ends - self.now()
-            if seconds_left <= 0.0:
-                return None
-            self._port.timeout = seconds_left
+            if self._heard:
+                seconds_left = min(seconds_left, GAP_S + 20.0 / self.baud)
+            # What has come by the end is read, also by a program that was held up.
+            self._port.timeout = max(0.0, seconds_left)
             data = self._port.read(max(1, self._port.in_waiting))
-            self._heard |= bool(data)
+            if not data:
+                break
+            self._heard = True
             self._received += data
+        return None
 
     def close(self) -> None:
         """Close the port; calling it twice is fine."""

@@ -23,7 +23,6 @@ from edge.bus.protocol import (
 
 ADDRESSES = range(0x70, 0x78)
 CHANNELS = 8
-LEAVE_ATTEMPTS = 4
 
 
 class TCA9548A:
@@ -131,11 +130,10 @@ class TCA9548A:
         self.control = None
 
     def leave(self) -> None:
-        """Disconnect, so that a mux beside may connect; a mux that never answers is
+        """Disconnect, so that a mux beside may connect; one that does not answer is
         passed over."""
-        for _ in range(LEAVE_ATTEMPTS):
-            with suppress(BusNack):
-                return self.select(None)
+        with suppress(BusNack):
+            self.select(None)
 
 
 class Channel:

@@ -93,6 +93,8 @@ class AD7147(Chip):
     name = "ad7147"
     addresses = range(0x2C, 0x30)
     stages = STAGES
+    # The middle half of the converter's range (AD7147 data sheet).
+    usual_rest = (0x4000, 0xC000)
     frame_pointer = words((RESULTS,))
 
     def __init__(

@@ -16,7 +16,7 @@ import numpy as np
 
 from edge.arrays import Bytes, Counts
 from edge.bus.crc import crc16, sealed
-from edge.bus.protocol import Bus, fetch, read, write
+from edge.bus.protocol import Bus, BusFault, Transfer, read, write
 from edge.chips.chip import Chip, ChipSpec, Defaults, Option, Parsed, Traits
 
 IDENTITY = b"\x00"
@@ -117,14 +117,10 @@ class Block(Chip):
         super().__init__(bus, address, into=size if into is None else into)
         self._expected = identity(taxels, bits | self.flags)
         self._identity = bus.prepare(write(address, IDENTITY), read(address, 10))
-        served = fetch(bus, address, IDENTITY, 10)
-        if served == self._expected:
+        if self.healthy():
             return
-        if served[:5] == MAGIC and served == sealed(served[:8]):
-            raise self.wrong(
-                f"serves {described(served)}, not {described(self._expected)}"
-            )
-        raise self.wrong("not a microcontroller that serves frames")
+        served = self._identity.buffer.tobytes()
+        raise self.wrong(f"serves {described(served)}, not {described(self._expected)}")
 
     @classmethod
     def of(cls, bus: Bus, spec: ChipSpec, into: Bytes) -> Self:
@@ -143,21 +139,38 @@ class Block(Chip):
 
     @staticmethod
     def parse(data: Bytes, spec: ChipSpec) -> Parsed:
-        """Taxels of n microcontrollers, and whether the CRC of their frame holds.
+        """Taxels of n microcontrollers; all are intact, since `read` checks the CRC.
 
         Args:
             data: (n, 4 + data_bytes) bytes.
             spec: of one of them.
 
         Returns:
-            (n, taxels) values and which of them are intact: all of a frame or none.
+            (n, taxels) values and which of them are intact.
         """
-        # The CRC over bytes with their own CRC is 0.
-        intact = np.array([[crc16(row.tobytes()) == 0] for row in data])
         values = unpack(data[:, 2:-2], len(spec.taxels), spec.option("bits"))
-        return values, np.broadcast_to(intact, values.shape)
+        return values, np.ones(values.shape, np.bool_)
 
     def healthy(self) -> bool:
         """Whether its identity is still the same."""
-        self.bus.transfer(self._identity)
+        self._receive(self._identity)
         return self._identity.buffer.tobytes() == self._expected
+
+    def read(self) -> None:
+        """Read all taxels.
+
+        Raises:
+            BusError: the transaction failed, or the CRC of the frame is wrong.
+        """
+        self._receive(self.frame)
+
+    def _receive(self, transfer: Transfer) -> None:
+        """Read a register, and again where its CRC is wrong, as a broken transfer."""
+        for _ in range(1 + BusFault.retries):
+            self.bus.transfer(transfer)
+            # The CRC over bytes with their own CRC is 0.
+            if crc16(transfer.buffer.tobytes()) == 0:
+                return
+        raise self.wrong(
+            "serves no frames, or damaged ones; check the firmware and the cable"
+        )

@@ -93,6 +93,8 @@ class Chip(ABC):
         serial: whether it can be on a serial port.
         rests_at_zero: whether 0 is a usable value at rest, and no sign of a broken
             input.
+        usual_rest: the lowest and the highest raw value at which its taxels usually
+            rest; None where that depends on the sensors.
         bus: a bus or a mux's channel.
         address: 7 bits.
         frame: the prepared transfer `[write pointer][read all taxels]`.
@@ -106,6 +108,7 @@ class Chip(ABC):
     unchanged_frames: ClassVar[int | None] = None
     serial: ClassVar[bool] = False
     rests_at_zero: ClassVar[bool] = False
+    usual_rest: ClassVar[tuple[int, int] | None] = None
 
     def __init__(
         self,

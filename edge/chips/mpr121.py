@@ -51,6 +51,8 @@ class MPR121(Chip):
     name = "mpr121"
     addresses = range(0x5A, 0x5E)
     stages = ELECTRODES
+    # The limits of its automatic configuration at 3.3 V, times four (AN3889).
+    usual_rest = (524, 804)
     frame_pointer = bytes([RESULTS])
 
     def __init__(

@@ -48,9 +48,9 @@ class ThreeAxisBlock(Block):
 
     @staticmethod
     def parse(data: Bytes, spec: ChipSpec) -> Parsed:
-        """Normal values of n microcontrollers, and which of them are intact."""
-        _, intact = Block.parse(data, spec)
-        return axes(data, len(spec.taxels))[:, :, 0], intact
+        """Normal values of n microcontrollers; see `Block.parse`."""
+        values = axes(data, len(spec.taxels))[:, :, 0]
+        return values, np.ones(values.shape, np.bool_)
 
 
 def axes(data: Bytes, taxels: int) -> Counts:

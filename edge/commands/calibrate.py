@@ -2,7 +2,8 @@
 
 Reads the skin while nothing touches it, and writes each taxel's mean and standard
 deviation into the skin file. The old file is kept as skin.toml.bak. A skin that is
-touched, or has taxels that cannot be read or are saturated, is refused.
+touched, or has taxels that cannot be read or are saturated, is refused. The first time,
+nothing tells a skin that is pressed as a whole: --yes says that nothing touches it.
 """
 
 import argparse
@@ -52,6 +53,11 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         type=within(int, FEWEST_FRAMES, MOST_FRAMES),
         default=FRAMES,
         help="number of frames to average (default: %(default)s)",
+    )
+    parser.add_argument(
+        "--yes",
+        action="store_true",
+        help="at the first calibration: nothing touches the skin",
     )
     parser.add_argument(
         "--force",
@@ -213,6 +219,19 @@ def _rest(file: SkinFile, measured: Measurement) -> str:
     return f"{counted(len(rest), 'taxel')} rest at {middle} +- {spread}"
 
 
+def first_rest(file: SkinFile, measured: Measurement) -> str:
+    """Where the chips rest, and where they usually do, for a person to judge."""
+    rest = measured.calibration.baseline.ravel()
+    middles = [int(np.median(rest[chip.served])) for chip in file.chips]
+    usual = {
+        f"an {kind.name.upper()} usually at {kind.usual_rest[0]} to {kind.usual_rest[1]}"
+        for kind in {chip.kind for chip in file.chips}
+        if kind.usual_rest is not None
+    }
+    chips = f"the chips at {min(middles)} to {max(middles)}"
+    return ", ".join([_rest(file, measured), chips, *sorted(usual)])
+
+
 def standing_out(file: SkinFile, baseline: Counts) -> Integers:
     """Counts (rows, cols) by which working taxels rest beyond the usual differences to
     others of their kind, in the direction of a touch.
@@ -320,6 +339,11 @@ def run(arguments: argparse.Namespace) -> int:
         if not arguments.force:
             raise InputError(f"{problem}; or use --force")
         LOG.warning(problem)
+    if former is None and not (arguments.yes or arguments.force):
+        raise InputError(
+            f"{arguments.skin}: {first_rest(file, measured)}; if nothing touches the skin, "
+            "give --yes for this first calibration"
+        )
     backup = save_calibration(arguments.skin, measured.calibration)
     median = float(np.median(noise))
     largest = float(noise.max())

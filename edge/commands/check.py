@@ -11,6 +11,7 @@ import argparse
 from collections.abc import Iterator
 from dataclasses import asdict
 
+from edge.chips.block import UNCHANGED_FRAMES
 from edge.commands.options import add_file, within
 from edge.commands.output import Output, counted
 from edge.skin.calibration import deaf_taxels
@@ -88,11 +89,18 @@ def remarks(file: SkinFile) -> Iterator[str]:
     if file.calibration is None:
         yield f"not calibrated yet: run `edge-classify calibrate --skin {file.path}`"
         return
-    hidden = int((stuck_limits(file) == NEVER_STUCK).sum())
+    limits = stuck_limits(file)
+    hidden = int((limits == NEVER_STUCK).sum())
     if hidden:
         yield (
             f"{counted(hidden, 'chip')} could freeze unseen: their noise is hidden by "
             "whole counts, so that equal readings prove nothing"
+        )
+    slow = limits[(limits > UNCHANGED_FRAMES) & (limits < NEVER_STUCK)]
+    if slow.size:
+        yield (
+            f"{counted(slow.size, 'chip')} would stay valid for up to {slow.max()} frames "
+            "after freezing: their noise is below half a count"
         )
 
 

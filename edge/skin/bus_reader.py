@@ -1,10 +1,8 @@
 """The chips of one bus: read in every frame, and brought back after a failure.
 
-A failed transaction is sent again as its error's `retries` say. A chip that still fails
-is down; it is tried again at once and then every 0.1 s, or every 0.3 s if it fails
-again within a second of its return, or its bus hangs for long. While a chip is being
-set up, the others are read in every fourth frame, and the time saved goes to it, one
-transaction at a time.
+`edge.bus.retrying` states what follows a failure. While a chip is being set up, the
+others are read in every fourth frame, and the time saved goes to it, one transaction at
+a time.
 """
 
 import math
@@ -19,29 +17,16 @@ from edge.bus.protocol import (
     Adapter,
     Bus,
     BusError,
-    BusGone,
     BusNack,
     BusRefused,
     BusTimeout,
 )
+from edge.bus.retrying import LONGEST_REST_S, MOST_CREDIT, RESTS, Retrying
 from edge.bus.tca9548a import TCA9548A
 from edge.chips.chip import Chip, ChipSpec
 from edge.skin.file import Reading
 from edge.skin.wiring import BusSpec
 
-PAUSE_S = 0.1
-"""Time between two attempts to bring the same chip back. All taxels must be back 0.5 s
-after a fault's end."""
-LONG_PAUSE_S = 0.3
-"""The same for a chip that failed again soon, and from a timeout to the next attempt on
-a bus that hangs for long."""
-MANY_TIMEOUTS = 8
-"""A bus hangs for long after so many timeouts without a chip that came back."""
-FLAPS_S = 1.0
-"""A chip that fails again within this time of its return is not tried again at once."""
-LONGEST_PAUSE_S = 1.0
-"""Longest time between two attempts to open a lost bus again. It is a tenth of the time
-since the loss, and no less than `PAUSE_S`."""
 SET_UP_AFTER = 8
 """A chip that keeps its settings but serves damaged bytes is set up again after this
 many frames in a row. At 100 Hz a conversion takes at most four frames."""
@@ -82,8 +67,8 @@ class Slot:
         has_settings: the settings were written and read back, and no loss was seen
             since.
         steps: the steps left until it runs, while it is being set up.
-        retry_at: when it may be brought back.
-        back_at: when it last came back.
+        began: when it was last tried: the beginning of its reading or set-up.
+        credit: see `edge.bus.retrying`.
     """
 
     spec: ChipSpec
@@ -96,8 +81,8 @@ class Slot:
     damaged: int = 0
     has_settings: bool = False
     steps: Iterator[None] | None = None
-    retry_at: float = -math.inf
-    back_at: float = -math.inf
+    began: float = NEVER
+    credit: int = 0
 
     @property
     def running(self) -> bool:
@@ -113,6 +98,7 @@ class Slot:
         self.chip.read()
         self.good = True
         self.at = bus.now()
+        self.credit = min(self.credit + 1, MOST_CREDIT)
 
     def begin(self, steps: Iterator[None]) -> None:
         """Begin to set up a running chip that has lost its settings."""
@@ -121,25 +107,19 @@ class Slot:
         self.has_settings = False
         self.steps = steps
 
-    def run(self, now: float) -> None:
+    def run(self) -> None:
         """Take it as running, after its last step."""
-        if self.error is not None:
-            self.back_at = now
         self.state = State.RUNNING
         self.error = None
         self.steps = None
 
-    def fail(self, error: BusError, now: float) -> None:
-        """Take it down; a chip that ran for a while is tried again at once."""
-        flaps = now - self.back_at < FLAPS_S
-        if self.running and not flaps:
-            self.retry_at = now
-        else:
-            self.retry_at = now + (LONG_PAUSE_S if flaps else PAUSE_S)
+    def fail(self, error: BusError) -> None:
+        """Take it down."""
         self.state = State.DOWN
         self.good = False
         self.error = error
         self.steps = None
+        self.credit = max(0, self.credit - 1)
 
 
 class BusReader:
@@ -148,6 +128,7 @@ class BusReader:
     Attributes:
         bus: the open bus.
         slots: its chips, in reading order.
+        lost: whether every chip has failed; the bus is then opened again and again.
     """
 
     def __init__(
@@ -166,23 +147,16 @@ class BusReader:
             reading: `verify_mux` and `recheck_frames` apply.
         """
         self.bus = bus
+        self.lost = False
+        self._retrying = Retrying(bus)
         self.slots = list(map(Slot, spec.chips, rows))
         self._reading = reading
         self._muxes: dict[int, TCA9548A] = {}
         self._frame = 0
-        self._timeouts = 0
-        self._hangs = 0
-        """Timeouts since a chip came back."""
+        self._hung: Slot | None = None
+        """The chip that hung last in this frame."""
         self._rest_until = -math.inf
         """No chip is brought back before this time."""
-        self._lost_at = math.inf
-        """When the bus was lost; infinity while a chip runs."""
-        self._reopen_at = -math.inf
-
-    @property
-    def lost(self) -> bool:
-        """Whether every chip has failed; the bus is then opened again and again."""
-        return self._lost_at < math.inf
 
     def start(self) -> None:
         """Identify and set up every chip; one that fails twice is left down.
@@ -192,10 +166,10 @@ class BusReader:
         """
         for _ in range(2):
             for slot in self.slots:
-                self._timeouts = 0
+                self._hung = None
                 while not slot.running and self._step(slot):
                     pass
-            if not self._any_runs() and not self._reopened():
+            if not self._reachable():
                 break
         for slot in self.slots:
             if isinstance(slot.error, BusRefused):
@@ -209,7 +183,7 @@ class BusReader:
                 only.
         """
         self._frame += 1
-        self._timeouts = 0
+        self._hung = None
         slots = self.slots
         if self._setting_up():
             share = -(-len(slots) // OLDEST_FRAMES)
@@ -225,9 +199,6 @@ class BusReader:
 
     def _setting_up(self) -> bool:
         return any(slot.steps is not None for slot in self.slots)
-
-    def _any_runs(self) -> bool:
-        return any(slot.running for slot in self.slots)
 
     def _read_channel(self, slots: Sequence[Slot]) -> None:
         """Read the chips on one channel of a mux, or on the bus itself.
@@ -258,9 +229,8 @@ class BusReader:
         return False
 
     def _kept(self, mux: TCA9548A) -> bool:
-        for _ in range(2):
-            with suppress(BusError):
-                return mux.kept()
+        with suppress(BusError):
+            return mux.kept()
         return False
 
     def _read(self, slot: Slot, mux: TCA9548A | None = None) -> bool:
@@ -273,18 +243,16 @@ class BusReader:
         slot.good = False
         if slot.running:
             self._doubt(slot)
-        on_its_channel = True
-        tries = 0
-        while slot.running and not slot.good:
-            try:
-                slot.read(self.bus)
-            except BusError as error:
-                if mux is not None and isinstance(error, BusNack):
-                    on_its_channel = on_its_channel and self._kept(mux)
-                if tries >= error.retries:
-                    self._fail(slot, error)
-                tries += 1
-        return on_its_channel
+        if not slot.running:
+            return True
+        slot.began = self.bus.now()
+        try:
+            slot.read(self.bus)
+        except BusError as error:
+            if mux is not None and isinstance(error, BusNack) and not self._kept(mux):
+                return False
+            self._fail(slot, error)
+        return True
 
     def _doubt(self, slot: Slot) -> None:
         """Check a chip after damaged bytes, or set it up again."""
@@ -311,70 +279,65 @@ class BusReader:
             self._fail(slot, error)
 
     def _fail(self, slot: Slot, error: BusError) -> None:
-        """Take a chip down, or all chips where the bus is gone or hangs."""
+        """Take a chip down, or all chips where the bus hangs."""
         now = self.bus.now()
         for mux in self._muxes.values():
             mux.forget()
+        slot.fail(error)
         if isinstance(error, BusTimeout):
-            self._timeouts += 1
-            self._hangs += 1
-            lasts = self._hangs > MANY_TIMEOUTS
-            self._rest_until = now + (LONG_PAUSE_S if lasts else PAUSE_S)
-        gone = isinstance(error, BusGone)
-        if gone:
-            self.bus.close()
-        for failing in self.slots if gone or self._timeouts > 1 else [slot]:
-            failing.fail(error, now)
+            if self._hung not in (None, slot):
+                for beside in self.slots:
+                    beside.fail(error)
+                    beside.credit = 0
+            self._hung = slot
+        if slot.credit == 0:
+            self.lost = not self._any_alive()
+            rest = math.inf if self.lost else RESTS * (now - slot.began)
+            self._rest_until = now + min(rest, LONGEST_REST_S)
 
-    def _is_due(self, slot: Slot) -> bool:
-        return not slot.running and slot.retry_at <= self.bus.now()
+    def _any_alive(self) -> bool:
+        return any(slot.running or slot.steps is not None for slot in self.slots)
 
-    def _rests(self) -> bool:
-        return self.bus.now() < self._rest_until
+    def _time_left(self, deadline: float = math.inf) -> bool:
+        """Whether a chip may be brought back now."""
+        return self._rest_until <= self.bus.now() < deadline
 
     def _bring_back(self, deadline: float) -> None:
         """Bring chips back, the longest waiting first, until the deadline."""
-        due = sorted(filter(self._is_due, self.slots), key=lambda slot: slot.retry_at)
-        if not due or self._rests() or not self._reachable():
+        waiting = [slot for slot in self.slots if not slot.running]
+        if not waiting or not self._time_left() or not self._reachable():
             return
-        self._step(due[0])
-        for slot in due:
-            while self._is_due(slot):
-                if self.bus.now() >= deadline or self._rests():
-                    return
-                self._step(slot)
+        for slot in sorted(waiting, key=lambda slot: slot.began):
+            while self._step(slot) and not slot.running and self._time_left(deadline):
+                pass
+            if not self._time_left(deadline):
+                return
 
     def _reachable(self) -> bool:
-        """Whether the bus is open; one on which no chip runs is opened again."""
-        if self._setting_up() or self._any_runs():
-            return True
-        return self.bus.now() >= self._reopen_at and self._reopened()
-
-    def _reopened(self) -> bool:
-        """Close and open a bus on which no chip runs.
+        """Whether the bus is open; one on which no chip runs is opened again.
 
         The kernel removes an unplugged adapter, and lets it return, only once no
         program has its device open; until then every transfer fails with EIO.
         """
-        now = self.bus.now()
-        self._lost_at = min(self._lost_at, now)
-        pause = max(PAUSE_S, 0.1 * (now - self._lost_at))
-        self._reopen_at = now + min(pause, LONGEST_PAUSE_S)
+        if self._any_alive():
+            return True
         with suppress(BusError):
             self.bus.reopen()
             return True
+        self.lost = True
+        self._rest_until = self.bus.now() + LONGEST_REST_S
         return False
 
     def _step(self, slot: Slot) -> bool:
         """Take one step to bring a chip back; False where it failed."""
-        slot.steps = slot.steps or self._set_up(slot)
+        if slot.steps is None:
+            slot.began = self.bus.now()
+            slot.steps = self._set_up(slot)
         try:
             next(slot.steps)
         except StopIteration:
-            slot.run(self.bus.now())
-            self._hangs = 0
-            self._lost_at = math.inf
-            self._reopen_at = -math.inf
+            slot.run()
+            self.lost = False
         except BusError as error:
             self._fail(slot, error)
             return False
@@ -386,7 +349,7 @@ class BusReader:
         A chip that kept its settings needs only the last one, which reads a frame: a
         chip that cannot serve one does not run.
         """
-        if not (slot.has_settings and slot.chip.healthy()):
+        if not (slot.has_settings and (slot.credit or slot.chip.healthy())):
             slot.has_settings = False
             slot.chip = slot.spec.kind.of(self._bus_of(slot.spec), slot.spec, slot.row)
             yield
@@ -397,10 +360,10 @@ class BusReader:
     def _bus_of(self, spec: ChipSpec) -> Bus:
         """The bus of a chip: this one, or the channel of a mux on it."""
         if spec.mux is None or spec.channel is None:
-            return self.bus
+            return self._retrying
         if spec.mux not in self._muxes:
             self._muxes[spec.mux] = TCA9548A(
-                self.bus,
+                self._retrying,
                 spec.mux,
                 verify=self._reading.verify_mux,
                 beside=self._muxes.values(),

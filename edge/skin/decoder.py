@@ -16,11 +16,11 @@ from edge.skin.file import Signal, SkinFile
 
 NEVER_STUCK = int(np.iinfo(np.int64).max)
 """The limit of a chip that may repeat its bytes for ever."""
-LOG_CHANCE = -27.6
-"""Logarithm of the chance, 1e-12, that a working chip repeats its bytes for so long that
-it counts as stuck."""
-CONVERSION_FRAMES = 4
-"""Frames that may hold the values of one conversion."""
+LOG_CHANCE = -20.7
+"""Logarithm of the chance, 1e-9, that a working chip repeats its bytes for so long that
+it counts as stuck: once in days on a skin of 32 chips, for a frame."""
+CONVERSION_S = 0.0093
+"""Longest time of a conversion (AD7147)."""
 COARSE = 0.4
 """Variance in squared counts below which a reading takes two or three whole numbers."""
 SCALE_BITS = 12
@@ -104,6 +104,7 @@ def stuck_limits(file: SkinFile) -> Integers:
     hold a sequence number, must the bytes change.
     """
     stuck = file.reading.stuck_frames
+    frames_each = 1 + math.ceil(CONVERSION_S * file.reading.rate_hz)
     limits = []
     for chip in file.chips:
         limit = NEVER_STUCK
@@ -112,7 +113,7 @@ def stuck_limits(file: SkinFile) -> Integers:
             log_chance = float(np.log(repeat_chance(noise)).sum())
             if stuck * log_chance <= LOG_CHANCE:
                 conversions = math.ceil(LOG_CHANCE / log_chance)
-                limit = min(CONVERSION_FRAMES * conversions, stuck)
+                limit = min(frames_each * conversions, stuck)
         if chip.kind.unchanged_frames is not None:
             limit = min(chip.kind.unchanged_frames, stuck)
         limits.append(limit)

@@ -47,7 +47,7 @@ class Reading:
 
     Attributes:
         rate_hz: of frames.
-        timeout_s: longest time that a hung chip costs; adapters round it up to 10 ms.
+        timeout_s: what a hung transfer costs; adapters round it up to 10 ms.
         verify_mux: read a mux's control byte back after each selection.
         recheck_frames: number of frames between two checks of a chip's settings on each
             bus.

@@ -141,6 +141,7 @@ class Skin:
         """(rows, cols) the broken taxels that were last named."""
         self._silent = 0
         self._since_silent = 0
+        self._since_changes = SILENT_FRAMES
         self._touched_at = -math.inf
         self._states: list[State] = []
         self._lost = [False] * len(self.readers)
@@ -217,13 +218,16 @@ class Skin:
         return changes
 
     def changes(self) -> list[ChipStatus]:
-        """The chips whose state has changed since the last call, or since the start.
+        """The chips whose state has changed since it was last given, or since the start.
 
-        A chip that is down stays so until it runs, whatever is tried.
+        Call it once a frame; a loose wire is told in one of `SILENT_FRAMES` frames at
+        most. A chip that is down stays so until it runs, whatever is tried.
         """
+        self._since_changes += 1
         states = [slot.state for slot in self._slots]
-        if states == self._states:
+        if states == self._states or self._since_changes < SILENT_FRAMES:
             return []
+        self._since_changes = 0
         former = self._states
         self._states = states
         pairs = zip(self.status(), former, strict=True)

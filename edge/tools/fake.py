@@ -66,7 +66,7 @@ def run(arguments: argparse.Namespace) -> int:
         },
         f"{folder}: {len(paths)} labelled touches of 4 objects\n{rest}: no touch\n\n"
         "Rehearse with them:\n"
-        f"  edge-classify calibrate --skin {skin} --fake {rest} --frames {frames}\n"
+        f"  edge-classify calibrate --skin {skin} --fake {rest} --frames {frames} --yes\n"
         f"  edge-classify view --skin {skin} --fake {first}\n"
         f"  edge-classify record --skin {skin} --fake {first} --label object=box --out "
         "recordings\n"

@@ -1,7 +1,6 @@
 """Commands that run in a checkout of the project, on the workstation."""
 
 import os
-import subprocess
 import sys
 from collections.abc import Sequence
 from difflib import get_close_matches
@@ -29,7 +28,8 @@ MEANT = {
 
 
 def run(words: Sequence[str]) -> int:
-    """Run a command in the checkout that this package is part of; its exit status.
+    """Become the command in the checkout that this package is part of, so that signals
+    reach it and no process waits for it.
 
     Elsewhere a sentence says where it runs, and the status is 2.
     """
@@ -47,10 +47,7 @@ def run(words: Sequence[str]) -> int:
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join(paths)}
     # Without -P a folder `train` or `export` of the user's would run instead.
     program = [sys.executable, "-P", "-m", *module, *options]
-    try:
-        return subprocess.call(program, env=environment)
-    except KeyboardInterrupt:
-        return 130
+    os.execve(sys.executable, program, environment)
 
 
 def refuse_command(program: str, word: str, commands: Sequence[str]) -> int:

@@ -58,19 +58,6 @@ def test_an_errno_is_a_named_error_and_a_builtin_one(code, error, builtin):
     )
 
 
-def test_a_hung_transfer_is_not_sent_again_and_a_broken_one_is():
-    retries = [
-        e.retries
-        for e in (
-            protocol.BusTimeout,
-            protocol.BusGone,
-            protocol.BusFault,
-            protocol.BusNack,
-        )
-    ]
-    assert retries == [0, 0, 2, 3]
-
-
 def test_a_device_that_is_missing_or_no_bus_is_named(tmp_path):
     with pytest.raises(
         protocol.BusMissing, match=r"^/dev/i2c-no-such: no such bus; .*ENOENT"

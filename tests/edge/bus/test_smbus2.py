@@ -47,8 +47,8 @@ def test_a_whole_skin_is_read_through_the_ioctl_path(library, tmp_path):
     process = run(library, WHOLE_SKIN, I2CDEV_LOG=str(log))
     assert process.stdout == "384 0\n"
     assert process.stderr == ""
-    # 20 ms are two of the adapter's units of 10 ms, on each of the three buses.
-    assert log.read_text() == "timeout 2\n" * 3
+    # 10 ms are one of the adapter's units, on each of the three buses.
+    assert log.read_text() == "timeout 1\n" * 3
 
 
 def test_a_call_that_the_kernel_completes_in_part_is_no_reading(library):

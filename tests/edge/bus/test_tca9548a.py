@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from edge.bus.protocol import BusFault, write
-from edge.bus.tca9548a import LEAVE_ATTEMPTS, TCA9548A
+from edge.bus.tca9548a import TCA9548A
 from edge.chips.ad7147 import AD7147
 from edge.fake.ad7147 import FakeAD7147
 from edge.fake.bus import FakeTCA9548A
@@ -55,22 +55,14 @@ def test_two_muxes_on_one_bus_are_never_open_at_once(bus):
         assert [m.connected for m in bus.chips.values()].count([2]) == 1
 
 
-@pytest.mark.parametrize(
-    ("absent", "opens"), [(LEAVE_ATTEMPTS - 1, True), (LEAVE_ATTEMPTS, False)]
-)
-def test_a_mux_beside_is_asked_four_times_to_leave_the_bus_and_then_passed_over(
-    bus,
-    absent,
-    opens,
-):
+def test_a_mux_beside_that_does_not_answer_is_passed_over(bus):
     """One that has gone must not cost the chips of this one."""
     first, second = beside(bus)
     second.select(5)
-    bus.inject([Fault(address=0x71, at=range(absent))])
+    bus.inject([Fault(address=0x71)])
     first.select(3)
     assert first.control == 1 << 3
-    assert bus.met == absent
-    assert (bus.chips[0x71].connected == []) == opens
+    assert bus.met == 1
 
 
 def test_a_channel_that_another_program_opens_beside_is_noticed_and_closed(bus):

@@ -1,16 +1,16 @@
 """A microcontroller that serves whole frames: packed taxels under a CRC."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
 from edge.chips import block
 from edge.chips.block import Block
-from edge.chips.chip import ChipSpec
+from edge.chips.chip import WrongChip
 from edge.fake.block import FakeBlock
-from edge.fake.bus import FakeBus
 from tests.edge.chips.chips import sense
-
-SPEC = ChipSpec(Block, 0x28, tuple(range(12)))
+from tests.faulty import Fault, FaultyBus
 
 
 @pytest.mark.parametrize("bits", [8, 12, 16])
@@ -28,13 +28,22 @@ def test_of_12_bits_has_the_high_bits_first():
     assert block.pack(np.array([0xABC, 0xDEF], dtype=np.uint16), 12).hex() == "abcdef"
 
 
-def test_tells_every_single_flipped_bit():
-    bus = FakeBus(chips={0x28: FakeBlock(sense, taxels=12, bits=16)})
+def test_every_single_flipped_bit_is_told_and_the_frame_read_again():
+    bus = FaultyBus(chips={0x28: FakeBlock(sense, taxels=12, bits=16)})
     chip = Block(bus, 0x28, taxels=12)
-    bus.transfer(chip.frame)
+    chip.read()
     good = chip.frame.buffer.copy()
-    flipped = np.repeat(good[None], good.size * 8, axis=0)
-    for i in range(good.size * 8):
-        flipped[i, i // 8] ^= 1 << i % 8
-    assert Block.parse(good[None], SPEC)[1].all()
-    assert not Block.parse(flipped, SPEC)[1].any()
+    for bit in range(good.size * 8):
+        bus.inject([Fault("flip", at=[0])])
+        bus.random = SimpleNamespace(randrange=lambda n, bit=bit: bit)
+        chip.read()
+        np.testing.assert_array_equal(chip.frame.buffer, good)
+        assert bus.carried == 2
+
+
+def test_a_frame_whose_crc_stays_wrong_is_a_broken_transfer():
+    bus = FaultyBus(chips={0x28: FakeBlock(sense, taxels=12, bits=16)})
+    chip = Block(bus, 0x28, taxels=12)
+    bus.inject([Fault("flip")])
+    with pytest.raises(WrongChip):
+        chip.read()

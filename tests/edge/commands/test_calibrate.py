@@ -37,7 +37,7 @@ def measured(edge, skin):
     """Calibrate the skin from a recording; returns status, event and stderr."""
 
     def run(recording, *options, frames=30):
-        fake = ("--skin", skin, "--fake", recording, "--frames", frames)
+        fake = ("--skin", skin, "--fake", recording, "--frames", frames, "--yes")
         status, events, err = edge("calibrate", *fake, *options)
         return status, events[0] if events else None, err
 
@@ -230,6 +230,20 @@ def test_a_skin_that_something_leans_on_steadily_is_refused(
     status, _, err = measured(path, "--force")
     assert status == 0
     assert f"rest {compared}, [5, 5], [5, 6], [5, 7], [6, 5]" in err
+
+
+def test_a_first_calibration_asks_whether_the_whole_skin_is_pressed(
+    edge, skin, measured, leant
+):
+    before = skin.read_text()
+    pressed = leant(5000, [(slice(None), slice(None))])
+    status, _, err = edge(
+        "calibrate", "--skin", skin, "--fake", pressed, "--frames", 20
+    )
+    assert status == 2
+    assert "the chips at 25946 to 25946, an AD7147 usually at 16384 to 49152" in err
+    assert skin.read_text() == before
+    assert measured(pressed)[0] == 0
 
 
 @pytest.mark.parametrize(("counts", "taxels"), [(120, SIX[:1]), (40, SIX)])

@@ -15,4 +15,4 @@ def test_what_to_rehearse_next_is_said_at_a_terminal(edge, tmp_path, monkeypatch
     assert not leftover.exists()
     still = tmp_path / "still.npz"
     command = f"edge-classify calibrate --skin {skin} --fake {still} --frames "
-    assert f"  {command}{len(load(still).t)}\n" in out
+    assert f"  {command}{len(load(still).t)} --yes\n" in out

@@ -1,8 +1,12 @@
 """The workstation's commands from the board's command line."""
 
+import os
+
 import pytest
 
+import edge
 from edge.tools import workstation
+from tests.conftest import ROOT, python
 
 
 @pytest.fixture
@@ -21,28 +25,28 @@ def root(monkeypatch, tmp_path):
     ],
 )
 def test_a_command_of_the_workstation_runs_in_the_checkout(
-    root,
-    package,
-    words,
-    output,
-    capfd,
+    root, package, words, output
 ):
+    """The command takes the program's place, as a test in the same process cannot."""
     (root / package).mkdir()
     (root / package / "__main__.py").write_text("import sys\nprint(sys.argv[1:])\n")
-    assert workstation.run(words) == 0
-    assert capfd.readouterr().out == output
+    program = f"""
+import edge
+from edge.tools import workstation
+edge.__file__ = {edge.__file__!r}
+workstation.run({words})
+"""
+    assert python("-c", program).stdout == output
 
 
-def test_a_folder_of_the_users_does_not_run_in_the_checkouts_place(
-    monkeypatch,
-    tmp_path,
-    capfd,
-):
+def test_a_folder_of_the_users_does_not_run_in_the_checkouts_place(tmp_path):
     (tmp_path / "train").mkdir()
     (tmp_path / "train" / "__main__.py").write_text("print('another train')\n")
-    monkeypatch.chdir(tmp_path)
-    assert workstation.run(["simulate", "none.toml", "--explain"]) == 2
-    assert capfd.readouterr().out == ""
+    words = ["simulate", "none.toml", "--explain"]
+    path = {**os.environ, "PYTHONPATH": str(ROOT)}
+    ran = python("-m", "edge", *words, cwd=tmp_path, env=path)
+    assert ran.returncode == 2
+    assert ran.stdout == ""
 
 
 def test_where_there_is_no_checkout_it_says_where_the_command_runs(root, capsys):
