@@ -57,7 +57,10 @@ def leaks(dataset: DataSet, y: Labels) -> list[str]:
     share = late_share(dataset)
     if share > 0.5:
         advice = "record from before the touch"
-        if proposed(recordings).onset > dataset.layout.onset:
+        onset = dataset.layout.onset
+        # A lower one was taken as it decides better.
+        is_recorded = onset >= recordings[0].layout.onset
+        if is_recorded and proposed(recordings).onset > onset:
             advice += ", or take higher thresholds (`python -m train thresholds`)"
         return [
             f"warning: {share:.0%} of the touches begin with their "

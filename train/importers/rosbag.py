@@ -13,7 +13,7 @@ from edge.files import open_regular, parsing
 from edge.touch.arm import Chain
 from train.importers import Trial
 from train.importers.options import LogOptions
-from train.importers.tables import needs
+from train.importers.table import needs
 from train.importers.topics import Log
 from train.importers.topics import add_options as add_options
 

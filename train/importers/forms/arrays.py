@@ -5,7 +5,7 @@ import math
 import zipfile
 from collections import defaultdict
 from collections.abc import Iterator, Mapping, Sequence
-from pathlib import Path
+from dataclasses import replace
 from typing import Any, BinaryIO
 
 import numpy as np
@@ -15,11 +15,11 @@ from scipy.io import loadmat, whosmat
 
 from edge.config import short_text
 from edge.errors import InputError, about
-from edge.files import parsing, read_bytes
+from edge.files import parsing
 from train.importers.columns import TIME
+from train.importers.forms.file import File
 from train.importers.options import TableOptions
-from train.importers.reading import LARGEST_BYTES
-from train.importers.tables import EMPTY, Table, needs, numbered, require_unique
+from train.importers.table import EMPTY, Table, needs, numbered, require_unique
 
 SUFFIXES = (".npy", ".npz", ".mat", ".h5", ".hdf5")
 MOST_VALUES = 1 << 25
@@ -29,25 +29,52 @@ Labelled = tuple[dict[str, str], Arrays]
 """The labels and the arrays of a trial."""
 
 
-def read_arrays(path: Path) -> Arrays:
+def is_form(file: File) -> bool:
+    """Whether the suffix is that of arrays."""
+    return file.suffix in SUFFIXES
+
+
+def tables(file: File, options: TableOptions) -> Iterator[Table]:
+    """The arrays as one trial, or as several with `--trials`.
+
+    Raises:
+        InputError: the arrays do not tell which axis is the time, or the trial.
+    """
+    where = str(file.path)
+    stored = read_arrays(file)
+    if not options.trials:
+        with about(where):
+            yield table_of(where, stored, options)
+        return
+    with about(where):
+        trials = list(trials_of(stored, options.task))
+    for number, (labels, arrays) in enumerate(trials):
+        name = f"{file.path.stem}_{number:03}"
+        trial = f"{where}: trial {name}"
+        with about(trial):
+            table = table_of(trial, arrays, options)
+        label = "the arrays" if labels else ""
+        yield replace(table, name=name, labels=labels, label=label)
+
+
+def read_arrays(file: File) -> Arrays:
     """{name: array} of a file, which is "" in an .npy file.
 
     Raises:
         InputError: the file cannot be read, or is too large.
     """
-    data = read_bytes(path, LARGEST_BYTES)
-    file = io.BytesIO(data)
-    with parsing(str(path), "a table", "; save it as text"), about(str(path)):
-        suffix = path.suffix.lower()
-        if suffix == ".npy":
-            stored = {"": np.lib.format.read_array(file)}
+    data = io.BytesIO(file.data)
+    where = str(file.path)
+    with parsing(where, "arrays", "; save them again"), about(where):
+        if file.suffix == ".npy":
+            stored = {"": np.lib.format.read_array(data)}
             _check_size(stored[""].size)
-        elif suffix == ".npz":
-            stored = _npz(file)
-        elif suffix == ".mat" and not data.startswith(b"MATLAB 7.3"):
-            stored = _mat(file)
+        elif file.suffix == ".npz":
+            stored = _npz(data)
+        elif file.suffix == ".mat" and not file.data.startswith(b"MATLAB 7.3"):
+            stored = _mat(data)
         else:
-            stored = _hdf5(file)
+            stored = _hdf5(data)
     return {
         name: array for name, array in stored.items() if isinstance(array, np.ndarray)
     }
