@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from edge.arrays import Array, Booleans, Counts, Floats
-from edge.config import parse_json, short_text
+from edge.config import ConfigTable, parse_json, short_text
 from edge.errors import InputError, about
 from edge.files import open_regular, parsing
 from edge.touch.frame import Frame
@@ -26,6 +26,9 @@ SLOWEST_HZ = 2.0
 FASTEST_HZ = 5000.0
 """Frame rates outside these limits are probably times in another unit."""
 LOG = logging.getLogger(__name__)
+ONSETS = ("first", "event")
+"""What tells the onsets of touches other than the skin: the first frame of a recording,
+or an event."""
 KEYS = ("t", "frames", "joints", "valid", "shear", "meta")
 
 
@@ -47,7 +50,9 @@ class Recording:
         valid: (rows, cols) or (n, rows, cols), True where a taxel could be read; None
             if all could.
         meta: `labels` {task: label}, `skin` (see `SkinLayout`), `joint_names` [name of
-            each column of `joints`], `source`, `trial`, and any other facts.
+            each column of `joints`], `onset` {`source`: first or event, `times_s`:
+            [seconds]} where the skin does not tell it, `source`, `trial`, and any other
+            facts.
         shear: (n, rows, cols, 2) counts along the rows (elbow to wrist) and around the
             columns, of the scale of `frames`; None on a skin of one axis.
     """
@@ -80,6 +85,12 @@ class Recording:
         return None if names is None else tuple(names)
 
     @property
+    def onsets_s(self) -> list[float]:
+        """Seconds at which touches begin, where something other than the skin told it."""
+        onset = self.meta.get("onset") or {"times_s": []}
+        return list(onset["times_s"])
+
+    @property
     def dof(self) -> int | None:
         """Number of joint angles in a frame, or None without any."""
         return None if self.joints is None else self.joints.shape[1]
@@ -104,6 +115,7 @@ class Recording:
 
     def __iter__(self) -> Iterator[Frame]:
         """Iterate over the frames as the live skin would give them."""
+        onsets = set(np.searchsorted(self.t, self.onsets_s).tolist())
         for i, t in enumerate(self.t.tolist()):
             valid = self.valid
             if valid is not None and valid.ndim == 3:
@@ -112,7 +124,14 @@ class Recording:
             if joints is not None and np.isnan(joints[0]):
                 joints = None
             shear = None if self.shear is None else self.shear[i]
-            yield Frame(t, self.frames[i], valid, joints=joints, shear=shear)
+            yield Frame(
+                t,
+                self.frames[i],
+                valid,
+                joints=joints,
+                shear=shear,
+                onset=i in onsets,
+            )
 
 
 def checked(path: str, recording: Recording, scale: float | None = None) -> Recording:
@@ -156,6 +175,8 @@ def checked(path: str, recording: Recording, scale: float | None = None) -> Reco
             raise InputError("meta.skin says axes = 3, but shear is missing")
         if "labels" in meta:
             meta["labels"] = read_labels(path, meta["labels"])
+        if meta.get("onset") is not None:
+            _check_onset(meta["onset"])
         if meta.get("joint_names") is not None:
             _check_joint_names(meta["joint_names"], joints)
     return Recording(t, frames, joints, recording.valid, meta, recording.shear)
@@ -262,6 +283,12 @@ def read_labels(path: str, values: Any) -> dict[str, str]:
 
         return plain(labels, path)
     return labels
+
+
+def _check_onset(onset: Any) -> None:
+    table = ConfigTable(onset, "meta.onset")
+    table.choice("source", ONSETS)
+    table.numbers("times_s")
 
 
 def _check_joint_names(names: Any, joints: Floats | None) -> None:

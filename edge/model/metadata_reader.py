@@ -15,6 +15,7 @@ from edge.model.info import (
     StoppingRule,
     Task,
 )
+from edge.recording import ONSETS
 from edge.touch.contact import feature_types
 from edge.touch.feature import KERNELS
 from edge.touch.layout import SkinLayout
@@ -99,6 +100,8 @@ def _read(meta: ConfigTable) -> ModelInfo:
         usual=_usual(meta, names),
         several_labels=meta.texts("several_labels", ()),
         still_s=meta.numbers("still_s", default=()),
+        repeats=meta.flag("repeats", False),
+        onset=meta.choice("onset", ("", *ONSETS), ""),
         speeds=meta.numbers("speeds", 2) if meta.has("speeds") else (),
     )
     tracking.refuse_unknown()

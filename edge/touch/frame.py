@@ -29,3 +29,5 @@ class Frame:
     shear: NDArray[np.int16] | None = None
     """(rows, cols, 2) tangential counts along the rows and around the columns; None on
     a skin of one axis."""
+    onset: bool = False
+    """A touch begins with this frame, as something other than the skin tells."""

@@ -41,8 +41,9 @@ def without_copies(recordings: Recordings) -> tuple[Recordings, list[str]]:
 
 
 def is_late(trial: Trial) -> bool:
-    """Whether a touch was under way in the first frame."""
-    return bool(trial.onset_s <= trial.recording.t[0])
+    """Whether a touch was under way in the first frame, and is not said to begin there."""
+    recording = trial.recording
+    return bool(trial.onset_s <= recording.t[0] and not recording.onsets_s)
 
 
 def late_share(dataset: DataSet) -> float:

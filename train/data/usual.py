@@ -1,22 +1,25 @@
 """How the training touches were made, against which the board doubts others.
 
-It compares a second region beside the contact, the standstill of joints, and the speed
-at which the arm came.
+It compares frames that repeat, what tells the onset, a second region beside the
+contact, the standstill of joints, and the speed at which the arm came.
 """
 
 from collections.abc import Sequence
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from edge.errors import InputError
 from edge.touch.contact import FeatureSeries
-from edge.touch.doubts import is_several
+from edge.touch.doubts import frame_doubts, is_several
 from edge.touch.joint_doubts import still_times
 from train.data.dataset import DataSet
 from train.data.folds import finest
 
 OFTEN = 0.2
-"""A second region is no doubt for a label if so many of its trials had one."""
+"""A second region is no doubt for a label if so many of its trials had one, and frames
+that repeat are none if they did in so many."""
 SELDOM = 0.01
 """Share of the trials that may lie outside of a usual range, on one side."""
 SLOWER = 0.97
@@ -39,6 +42,9 @@ def usual_touches(
     labels = dataset.labels(finest({task: dataset.labels(task) for task in tasks}))
     usual: dict[str, Any] = {}
     usual["several_labels"] = _often_several(labels.tolist(), series, window_s)
+    frozen = [frame_doubts(touch, window_s)["frozen"] for touch in series]
+    usual["repeats"] = bool(np.mean(frozen) >= OFTEN)
+    usual["onset"] = _onset(dataset)
     rests = [_still_times(touch, window_s) for touch in series]
     if any(rests):
         longest = np.quantile(rests, 1.0 - SELDOM, axis=0)
@@ -48,6 +54,25 @@ def usual_touches(
         low, high = np.nanquantile(speeds, (SELDOM, 1.0 - SELDOM))
         usual["speeds"] = SLOWER * float(low), FASTER * float(high) + RESTS
     return usual
+
+
+def _onset(dataset: DataSet) -> str:
+    """What tells the onsets of all trials, see `edge.model.info.ModelInfo`.
+
+    Raises:
+        InputError: it differs among the recordings.
+    """
+    sources: dict[str, Path] = {}
+    for trial in dataset.trials:
+        onset = trial.recording.meta.get("onset") or {"source": ""}
+        sources[onset["source"]] = trial.path
+    if len(sources) > 1:
+        first, second = list(sources.values())[:2]
+        raise InputError(
+            f"{first} and {second}: onsets come from {' and '.join(sorted(sources))}; "
+            "import all recordings with the same --onset or --onset-column"
+        )
+    return next(iter(sources))
 
 
 def _often_several(

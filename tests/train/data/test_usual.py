@@ -5,10 +5,11 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from edge.errors import InputError
 from train.data.usual import FASTER, RESTS, SLOWER, usual_touches
 
 
-def touch(speed, rest=0, joints=True, beside=0):
+def touch(speed, rest=0, joints=True, beside=0, repeats=0, onset=""):
     """A series of a second at 10 Hz, in which the second of two joints rests for so many
     frames, and a second region is there in so many."""
     n = 11
@@ -16,8 +17,12 @@ def touch(speed, rest=0, joints=True, beside=0):
     if joints:
         moving = np.arange(n, dtype=float)
         series.joints = np.stack([moving, np.maximum(moving - rest, 0.0)], axis=1)
+    series.same = (np.arange(n) > 0) & (np.arange(n) <= repeats)
+    series.area = np.ones(n, int)
     series.felt = lambda window_s: SimpleNamespace(beside=np.arange(n) < beside)
-    return SimpleNamespace(series=series)
+    meta = {"onset": {"source": onset}} if onset else {}
+    recording = SimpleNamespace(meta=meta)
+    return SimpleNamespace(series=series, recording=recording, path=f"{onset}.npz")
 
 
 def usual(labels, trials):
@@ -44,4 +49,19 @@ def test_the_standstill_and_the_speeds_are_those_of_nearly_all_trials():
 
 def test_without_joint_angles_nothing_is_said_of_them():
     trials = [touch(np.nan, joints=False)] * 3
-    assert usual({"object": ["box"] * 3}, trials).keys() == {"several_labels"}
+    keys = usual({"object": ["box"] * 3}, trials).keys()
+    assert keys == {"several_labels", "repeats", "onset"}
+
+
+@pytest.mark.parametrize(("repeating", "repeats"), [(1, False), (2, True)])
+def test_frames_that_repeat_in_a_fifth_of_the_trials_are_usual(repeating, repeats):
+    trials = [touch(1.0, repeats=10 * (i < repeating)) for i in range(10)]
+    assert usual({"object": ["box"] * 10}, trials)["repeats"] is repeats
+
+
+def test_all_onsets_come_from_one_source():
+    trials = [touch(1.0, onset="event")] * 3
+    assert usual({"object": ["box"] * 3}, trials)["onset"] == "event"
+    assert usual({"object": ["box"] * 3}, [touch(1.0)] * 3)["onset"] == ""
+    with pytest.raises(InputError, match="event.npz and .npz"):
+        usual({"object": ["box"] * 4}, [*trials, touch(1.0)])
