@@ -16,7 +16,7 @@ from edge.arrays import Array, Booleans, Counts, Floats
 from edge.config import ConfigTable, parse_json, short_text
 from edge.errors import InputError, about
 from edge.files import open_regular, parsing
-from edge.touch.frame import Frame
+from edge.touch.frame import ONSETS, Frame
 from edge.touch.layout import SkinLayout
 
 LARGEST_BYTES = 1 << 27
@@ -26,9 +26,6 @@ SLOWEST_HZ = 2.0
 FASTEST_HZ = 5000.0
 """Frame rates outside these limits are probably times in another unit."""
 LOG = logging.getLogger(__name__)
-ONSETS = ("first", "event")
-"""What tells the onsets of touches other than the skin: the first frame of a recording,
-or an event."""
 KEYS = ("t", "frames", "joints", "valid", "shear", "meta")
 
 

@@ -243,7 +243,7 @@ class ModelInfo:
     """Whether frames of many training touches repeat bit for bit, as of switches or coarse
     sensors, so that this is no doubt."""
     onset: str = ""
-    """What tells the onsets other than the skin, see `edge.recording.ONSETS`; empty where
+    """What tells the onsets other than the skin, see `edge.touch.frame.ONSETS`; empty where
     the skin does."""
     speeds: Sequence[float] = ()
     """Least and greatest speed of the joints before onset, in radians a second, for

@@ -15,9 +15,9 @@ from edge.model.info import (
     StoppingRule,
     Task,
 )
-from edge.recording import ONSETS
 from edge.touch.contact import feature_types
 from edge.touch.feature import KERNELS
+from edge.touch.frame import ONSETS
 from edge.touch.layout import SkinLayout
 
 

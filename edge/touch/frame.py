@@ -7,6 +7,10 @@ from numpy.typing import NDArray
 
 from edge.arrays import Booleans, Counts, Floats
 
+ONSETS = ("first", "event")
+"""What tells the onsets of touches other than the skin: the first frame of a recording,
+or an event."""
+
 
 @dataclass(frozen=True, slots=True)
 class Frame:

@@ -198,20 +198,18 @@ def _time_column(
 ) -> str | None:
     """The column of times; None where --rate gives them."""
     if options.time:
-        times = [column(table, "--time", options.time)]
-    else:
-        times = named_times(table, joints)
-    if not times:
-        if options.rate is None:
+        if options.rate is not None:
             raise InputError(
-                f"{table.where}: no column is a time; give --rate HZ, such as --rate "
-                f"100, or --time COL, among {short_text(table.names)}"
+                f"{table.where}: --time and --rate tell one thing; give one"
             )
-        return None
+        return column(table, "--time", options.time)
     if options.rate is not None:
+        return None
+    times = named_times(table, joints)
+    if not times:
         raise InputError(
-            f"{table.where}: has a column of times, {quoted(times[0])}, beside --rate; "
-            "leave --rate out, or name another time by --time"
+            f"{table.where}: no column is a time; give --rate HZ, such as --rate 100, or "
+            f"--time COL, among {short_text(table.names)}"
         )
     return times[0]
 

@@ -253,7 +253,9 @@ def _recorded(
     if usable[0].meaning.are_all:
         _require_taxels(usable)
     shape = _announced(usable, skin, labels, options)
-    rest = rest_of([trial.samples for trial in usable], options)
+    # What is cut at contact has no rest.
+    values = replace(options, counts=True) if options.onset else options
+    rest = rest_of([trial.samples for trial in usable], values)
 
     def recorded(trial: Measured, labels: Mapping[str, str]) -> Trial:
         if trial.meaning.kind != kind:

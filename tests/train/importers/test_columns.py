@@ -85,7 +85,7 @@ def test_columns_are_named_by_names_ranges_and_places(terms, names):
 @pytest.mark.parametrize(
     ("wishes", "sentence"),
     [
-        ({"taxels": "s3"}, r"a.csv: has no column s3; it has \['s1', 's2'\]"),
+        ({"taxels": "s3"}, r"a.csv: has no column s3; it has \['t', 's1', 's2'\]"),
         ({"taxels": "s1,s1"}, "named twice"),
         ({"taxels": "s1-s2", "joints": "s2"}, "both as a taxel and as time"),
         ({"time": "s1,s2"}, "--time names several columns"),
@@ -93,13 +93,16 @@ def test_columns_are_named_by_names_ranges_and_places(terms, names):
 )
 def test_contradictions_are_refused(wishes, sentence):
     with pytest.raises(InputError, match=sentence):
-        sense_of(table("s1", "s2"), rate=10, **wishes)
+        sense_of(table("t", "s1", "s2"), time_unit="s", **wishes)
 
 
-def test_a_rate_beside_a_time_is_refused_and_neither_too():
-    with pytest.raises(InputError, match="beside --rate"):
-        sense_of(table("t", "s1"), rate=10)
-    with pytest.raises(InputError, match="no column is a time; give --rate"):
+def test_a_rate_is_taken_before_a_column_and_one_of_them_is_needed():
+    sense = sense_of(table("t", "s1"), rate=10)
+    assert sense.time is None
+    assert sense.left_out == ["t"]
+    with pytest.raises(InputError, match="--time and --rate"):
+        sense_of(table("t", "s1"), rate=10, time="t")
+    with pytest.raises(InputError, match="give --rate"):
         sense_of(table("s1"))
 
 

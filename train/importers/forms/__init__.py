@@ -18,6 +18,7 @@ from train.importers.forms import (
     parquet,
     plx_daq,
     ros2_echo,
+    serial,
     tekscan,
     text,
     unread,
@@ -35,6 +36,7 @@ FORMS = [
     tekscan,
     plx_daq,
     ros2_echo,
+    serial,
     text,
 ]
 TEXTS = ".csv .tsv .txt .dat .log .asc .asf .json .jsonl .ndjson"

@@ -15,6 +15,7 @@ from train.importers.forms import (
     parquet,
     plx_daq,
     ros2_echo,
+    serial,
     tables_in,
     tekscan,
     unread,
@@ -120,6 +121,23 @@ def test_each_form_is_told_by_its_signature_and_read(tmp_path, write):
     assert seconds - seconds[0] == pytest.approx(T)
     values = table.data.drop(columns=time)
     assert values.to_numpy().tolist() == COUNTS.tolist()
+
+
+@pytest.mark.parametrize(
+    ("line", "names"),
+    [
+        ("12:00:{t:06.3f} -> {a},{b}", ["2", "3"]),
+        ("12:00:{t:06.3f} -> s1:{a}\ts2:{b}", ["s1", "s2"]),
+        ("s1:{a}, s2: {b}", ["s1", "s2"]),
+        ("s1={a} s2={b}", ["s1", "s2"]),
+    ],
+)
+def test_lines_of_a_serial_monitor(tmp_path, line, names):
+    rows = [line.format(t=t, a=i, b=2 * i) for i, t in enumerate(T)]
+    (tmp_path / "cup.log").write_text("\n".join(["Starting", *rows]))
+    assert serial.is_form(File(tmp_path / "cup.log"))
+    (table,) = tables_in(tmp_path / "cup.log", TableOptions())
+    assert table.data[names].to_numpy().tolist() == [[i, 2 * i] for i in range(40)]
 
 
 def test_a_restart_of_the_arduino_begins_another_trial(tmp_path):
