@@ -79,9 +79,10 @@ def contact_doubts(
         doubts |= joint_doubts(series, window_s, limits, info.still_s, info.speeds)
     return {
         **doubts,
+        "frozen": doubts["frozen"] and not info.repeats,
         "missing_taxels": contact.missing_taxels,
         "missing_pose": contact.missing_pose,
-        "late": contact.late,
+        "late": contact.late and not info.onset,
         "skin_motion": contact.chain is None and info.chain is not None,
     }
 

@@ -9,6 +9,7 @@ from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 from edge.answers import answers_about
+from edge.errors import InputError
 from edge.events import Decided, Event, Onset, Release
 from edge.model.model import Model
 from edge.touch.contact import Contact
@@ -19,7 +20,7 @@ if TYPE_CHECKING:
     from edge.early import Policy
     from edge.no_contact import Untouched
     from edge.recording import Recording
-    from edge.skin.loop import JointSource
+    from edge.skin.loop import JointSource, OnsetSource
     from edge.skin.skin import Skin
 
 ASKED_A_SECOND = 200.0
@@ -244,6 +245,7 @@ class Classifier:
         skin: Skin,
         *,
         joints: JointSource | None = None,
+        onsets: OnsetSource | None = None,
         lasts_s: float = math.inf,
     ) -> Iterator[Event]:
         """Read a skin at its rate and decide, until the caller stops iterating.
@@ -252,6 +254,7 @@ class Classifier:
             skin: open, real or fake.
             joints: the source of joint angles, for a model that measures motion in the
                 world.
+            onsets: the source of onsets, for a model whose touches begin by an event.
             lasts_s: how many seconds to read for; tasks that wait then are decided,
                 flagged `short`.
 
@@ -263,7 +266,8 @@ class Classifier:
         if joints is None and not self._motion_on_skin:
             self.model.require_joints(None, "the skin")
         yield from self._afresh(
-            skin.layout, Loop(skin, joints=joints, lasts_s=lasts_s).frames()
+            skin.layout,
+            Loop(skin, joints=joints, onsets=onsets, lasts_s=lasts_s).frames(),
         )
 
     def _afresh(self, layout: SkinLayout, frames: Iterable[Frame]) -> Iterator[Event]:
@@ -313,5 +317,10 @@ def suited(model: Model, recording: Recording, name: str) -> Recording:
     """
     if model.info.chain is not None:
         recording = recording.for_joints(model.info.chain.names, name)
+    if model.info.onset and not recording.onsets_s:
+        if model.info.onset != "first":
+            raise InputError(f"{name} has no onset in its meta, which the model needs")
+        onset = {"source": "first", "times_s": [float(recording.t[0])]}
+        recording = replace(recording, meta={**recording.meta, "onset": onset})
     model.require_joints(recording.dof, name)
     return recording

@@ -11,7 +11,10 @@ FLAGS = {
         "more than a 24th of the window (0.05 s of 1.2 s), and more than two usual "
         "steps, lies between two frames; also if times are not in seconds"
     ),
-    "frozen": "frames repeat bit for bit for twice as long",
+    "frozen": (
+        "frames repeat bit for bit for twice as long, as fewer than a fifth of the "
+        "training trials do"
+    ),
     "speed": (
         "the arm came more slowly than in 99 % of the training trials, so that what it "
         "would still have moved may be called fixed; or faster than in 99 %, by 15 %"

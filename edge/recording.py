@@ -12,10 +12,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from edge.arrays import Array, Booleans, Counts, Floats
+from edge.config import ConfigTable
 from edge.errors import InputError, about
 from edge.labels import Table, plain, read_table
 from edge.npz import load_arrays, load_meta
-from edge.touch.frame import Frame
+from edge.touch.frame import ONSETS, Frame
 from edge.touch.layout import SkinLayout
 
 SLOWEST_HZ = 2.0
@@ -44,7 +45,9 @@ class Recording:
         valid: (rows, cols) or (n, rows, cols), True where a taxel could be read; None
             if all could.
         meta: `labels` {task: label}, `skin` (see `SkinLayout`), `joint_names` [name of
-            each column of `joints`], `source`, `trial`, and any other facts.
+            each column of `joints`], `onset` {`source`: first or event, `times_s`:
+            [seconds]} where the skin does not tell it, `source`, `trial`, and any other
+            facts.
         shear: (n, rows, cols, 2) counts along the rows (elbow to wrist) and around the
             columns, of the scale of `frames`; None on a skin of one axis.
     """
@@ -77,6 +80,12 @@ class Recording:
         return None if names is None else tuple(names)
 
     @property
+    def onsets_s(self) -> list[float]:
+        """Seconds at which touches begin, where something other than the skin told it."""
+        onset = self.meta.get("onset") or {"times_s": []}
+        return list(onset["times_s"])
+
+    @property
     def dof(self) -> int | None:
         """Number of joint angles in a frame, or None without any."""
         return None if self.joints is None else self.joints.shape[1]
@@ -101,6 +110,7 @@ class Recording:
 
     def __iter__(self) -> Iterator[Frame]:
         """Iterate over the frames as the live skin would give them."""
+        onsets = set(np.searchsorted(self.t, self.onsets_s).tolist())
         for i, t in enumerate(self.t.tolist()):
             valid = self.valid
             if valid is not None and valid.ndim == 3:
@@ -109,7 +119,14 @@ class Recording:
             if joints is not None and np.isnan(joints[0]):
                 joints = None
             shear = None if self.shear is None else self.shear[i]
-            yield Frame(t, self.frames[i], valid, joints=joints, shear=shear)
+            yield Frame(
+                t,
+                self.frames[i],
+                valid,
+                joints=joints,
+                shear=shear,
+                onset=i in onsets,
+            )
 
 
 def checked(path: str, recording: Recording, scale: float | None = None) -> Recording:
@@ -153,6 +170,8 @@ def checked(path: str, recording: Recording, scale: float | None = None) -> Reco
             raise InputError("meta.skin says axes = 3, but shear is missing")
         if "labels" in meta:
             meta["labels"] = read_labels(path, meta["labels"])
+        if meta.get("onset") is not None:
+            _check_onset(meta["onset"])
         if meta.get("joint_names") is not None:
             _check_joint_names(meta["joint_names"], joints)
     return Recording(t, frames, joints, recording.valid, meta, recording.shear)
@@ -257,6 +276,12 @@ def read_labels(path: str, values: Any) -> dict[str, str]:
     if not all(name.isprintable() and name == name.strip() for name in names):
         return plain(labels, path)
     return labels
+
+
+def _check_onset(onset: Any) -> None:
+    table = ConfigTable(onset, "meta.onset")
+    table.choice("source", ONSETS)
+    table.numbers("times_s")
 
 
 def _check_joint_names(names: Any, joints: Floats | None) -> None:

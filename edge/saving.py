@@ -64,7 +64,7 @@ def save(
     warn_of_another_unit(name, recording.t)
     skin = recording.meta.get("skin", {})
     why = doubt(recording.t, recording.frames, skin, recording.layout.onset)
-    if why is not None:
+    if why is not None and not recording.onsets_s:
         LOG.warning(f"{name}: {why}")
     if recording.shear is not None and "simulation" not in recording.meta:
         from edge.touch import shear  # few skins have three axes

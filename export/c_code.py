@@ -356,6 +356,8 @@ def lacks(info: ModelInfo) -> Iterable[str]:
     layout = info.layout
     if layout.axes:
         yield "it takes no shear"
+    if info.onset:
+        yield "it finds the onset of a touch by the skin alone"
     total = layout.rows * layout.cols * 65535
     if (total * max(2 * layout.cols, layout.rows)) ** 2 >= LARGEST:
         yield f"the sums of {layout.rows} x {layout.cols} taxels exceed 64 bits"

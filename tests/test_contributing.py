@@ -10,6 +10,7 @@ import sys
 
 import numpy as np
 import pytest
+from pandas import DataFrame
 
 import edge.tools
 import train
@@ -19,6 +20,8 @@ from edge.recording import load
 from tests.conftest import ROOT
 from train.__main__ import main
 from train.data.feature_sets import SETS
+from train.importers import forms
+from train.importers.table import Table as Columns
 from train.report.section import Section, Table
 from train.study import run as study
 
@@ -40,7 +43,9 @@ def test_each_file_and_name_of_the_table_exists(row):
 
 
 def test_the_table_has_each_kind():
-    kinds = "chip|feature set|lab's data|message|effect|subcommand|section".split("|")
+    kinds = "chip|feature set|lab's data|form|message|effect|subcommand|section".split(
+        "|"
+    )
     for kind, row in zip(kinds, TABLE, strict=True):
         assert kind in row
 
@@ -85,6 +90,34 @@ def test_an_importer_is_a_module(monkeypatch, tmp_path, capsys):
         main(["import", "--help"])
     line = r"toy +Pictures of a toy, one trial a line"
     assert re.search(line, capsys.readouterr().out)
+
+
+class Toy:
+    """A form whose lines are a time and a word of as many letters as counts."""
+
+    @staticmethod
+    def is_form(file):
+        return file.head.startswith("toy")
+
+    @staticmethod
+    def tables(file, options):
+        rows = [line.split() for line in file.lines[1:] if line]
+        data = {"t": [float(t) for t, _ in rows], "s1": [len(word) for _, word in rows]}
+        yield Columns(str(file.path), DataFrame(data))
+
+
+def test_a_form_of_tables_is_an_entry_of_the_list(monkeypatch, tmp_path):
+    monkeypatch.setattr(forms, "FORMS", [Toy, *forms.FORMS])
+    (tmp_path / "cup_1.txt").write_text("toy\n0.0 a\n0.1 abc\n")
+    words = [
+        "import",
+        "csv",
+        str(tmp_path / "cup_1.txt"),
+        "--out",
+        str(tmp_path / "out"),
+    ]
+    assert main(words) == 0
+    assert load(tmp_path / "out" / "cup_1.npz").frames.ravel().tolist() == [1, 3]
 
 
 COMMAND = '''"""Say a word.

@@ -14,6 +14,8 @@ THROUGH = {
     "train/data/contacts.py": "train/data/test_dataset.py",
     "train/importers/rosbag.py": "train/importers/test_log_importers.py",
     "train/importers/topics.py": "train/importers/test_log_importers.py",
+    "train/importers/table.py": "train/importers/forms/test_text.py",
+    "train/importers/forms": "train/importers/forms/test_forms.py",
     "train/simulate/families.py": "train/simulate/test_simulate_scene.py",
     "train/simulate/groups.py": "train/simulate/test_effects.py",
     "train/simulate/truth.py": "train/simulate/test_simulate_truth.py",

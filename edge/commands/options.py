@@ -104,7 +104,8 @@ def add_reading(parser: argparse.ArgumentParser, web: str = "") -> None:
         metavar="stdin|udp:[HOST:]PORT",
         help='read joint angles as JSON lines {"t": seconds, "q": [radians]}; add '
         '"names": [joints] if they are not in the arm\'s order; without HOST, the port '
-        "listens on the loopback interface",
+        'listens on the loopback interface; a line {"onset": true} begins a touch, for a '
+        "model whose onsets come from outside",
     )
     parser.add_argument(
         "--web",

@@ -14,7 +14,7 @@ from edge.errors import InputError
 from edge.events import Event
 from edge.output.event_writer import Lines
 from edge.skin import file as skinfile
-from edge.skin.loop import JointSource, Loop, Stop, stop_on
+from edge.skin.loop import Loop, Stop, stop_on
 from edge.skin.skin import SILENT_FRAMES, ChipStatus, Skin
 from edge.touch.frame import Frame
 from edge.touch.layout import for_device
@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from edge.model.model import Model
     from edge.tools.page import Page
     from edge.touch.arm import Chain
+    from edge.touch.joint_stream import Joints
 
 
 def ending_signals() -> list[int]:
@@ -239,6 +240,8 @@ def reading(
     if arm is not None:
         names = arm.names
         dof = arm.dof
+    if dof is None and model is not None and model.info.onset:
+        dof = 0
     if arguments.fake is not None:
         arguments.real_time |= real_time or arguments.web is not None
     played_names = names if arguments.joints is None else None
@@ -250,7 +253,21 @@ def reading(
         if model is not None and needs_joints and arguments.joints is None:
             model.require_joints(opened.dof, opened.source)
         joints = stack.enter_context(_joints(arguments.joints, opened, dof, names))
-        loop = Loop(opened.skin, joints=joints, lasts_s=opened.lasts_s, stop=stop)
+        onsets: Joints | Playback | None = joints or opened.playback
+        if model is None or not model.info.onset:
+            onsets = None
+        elif onsets is None:
+            raise InputError(
+                "the model's touches begin by an event: give --joints stdin or udp:PORT, "
+                'with a line {"onset": true} for each'
+            )
+        loop = Loop(
+            opened.skin,
+            joints=None if dof == 0 else joints,
+            onsets=onsets,
+            lasts_s=opened.lasts_s,
+            stop=stop,
+        )
         live = stack.enter_context(_page(arguments.web, opened, page))
         yield Reading(opened, loop, stop, live, Output.of(arguments))
 
@@ -273,7 +290,7 @@ def _joints(
     opened: Opened,
     dof: int | None,
     names: Sequence[str] | None,
-) -> AbstractContextManager[JointSource | None]:
+) -> AbstractContextManager[Joints | Playback | None]:
     """The joint angles that another program sends, or those of a played recording."""
     if option is None:
         return nullcontext(opened.playback if opened.dof else None)

@@ -68,6 +68,8 @@ class Playback:
             self._length += PAUSES * recording.layout.release_s
         self.ends = math.inf if loop else self._length
         """Length in seconds; infinity where it loops."""
+        self._last = -1
+        """The last frame that was looked at for an onset."""
         self.start = 0.0
         """Start of the playback on the skin's clock."""
 
@@ -89,6 +91,15 @@ class Playback:
     def at(self, t: float) -> Floats | None:
         """Joint angles (dof,) at `t`; None where the recording has none."""
         return self._frames[self._index(t)].joints
+
+    def began(self, t: float) -> bool:
+        """Whether a touch has begun since the last call: with the first frame where the
+        recording has no onset of its own."""
+        index = self._index(t)
+        frames = self._frames[self._last + 1 : index + 1]
+        is_first = self._last < 0 and not self.recording.onsets_s
+        self._last = index
+        return is_first or any(frame.onset for frame in frames)
 
 
 def calibrated(file: SkinFile, noise_counts: float = 0.0) -> SkinFile:

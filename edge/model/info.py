@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 
 from edge.arrays import Floats
 from edge.elementary import log, logistic
+from edge.errors import InputError
 from edge.touch.features import feature_vector, widths
 from edge.touch.layout import SkinLayout, for_device
 from edge.touch.track import ContactTracker
@@ -234,6 +235,12 @@ class ModelInfo:
     still_s: Sequence[float] = ()
     """(dof,) seconds for which each joint stood still in nearly all training trials, at
     the longest."""
+    repeats: bool = False
+    """Whether frames of many training touches repeat bit for bit, as of switches or coarse
+    sensors, so that this is no doubt."""
+    onset: str = ""
+    """What tells the onsets other than the skin, see `edge.touch.frame.ONSETS`; empty where
+    the skin does."""
     speeds: Sequence[float] = ()
     """Least and greatest speed of the joints before onset, in radians a second, for
     which the training trials speak; empty where not known."""
@@ -295,7 +302,8 @@ class ModelInfo:
         The options are those of `ContactTracker`.
 
         Raises:
-            InputError: the skin is not the one that the model was made for.
+            InputError: the skin is not the one that the model was made for, or several
+                contacts are to have onsets from outside.
         """
         tracker = ContactTracker(
             for_device(self.layout, layout),
@@ -306,5 +314,8 @@ class ModelInfo:
             joints=self.joints,
             max_contacts=max_contacts,
         )
+        tracker.outside = bool(self.onset)
+        if tracker.outside and max_contacts > 1:
+            raise InputError("the model's onsets come from outside; give --contacts 1")
         tracker.motion_on_skin = motion_on_skin
         return tracker

@@ -5,7 +5,8 @@ import json
 from edge.model.info import FORMAT, ModelInfo
 
 OPTIONAL = (
-    "decision_points_s stopping novelty joints kernels name trials usual speeds".split()
+    "decision_points_s stopping novelty joints kernels name trials usual speeds repeats "
+    "onset".split()
 )
 """Keys that are left out where they would be empty."""
 

@@ -17,6 +17,7 @@ from edge.model.info import (
 )
 from edge.touch.contact import feature_types
 from edge.touch.feature import KERNELS
+from edge.touch.frame import ONSETS
 from edge.touch.layout import SkinLayout
 
 
@@ -98,6 +99,8 @@ def _read(meta: ConfigTable) -> ModelInfo:
         trials=meta.texts("trials", ()),
         usual=_usual(meta, names),
         still_s=meta.numbers("still_s", default=()),
+        repeats=meta.flag("repeats", False),
+        onset=meta.choice("onset", ("", *ONSETS), ""),
         speeds=meta.numbers("speeds", 2) if meta.has("speeds") else (),
     )
     tracking.refuse_unknown()

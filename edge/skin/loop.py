@@ -26,6 +26,14 @@ class JointSource(Protocol):
         unknown."""
 
 
+class OnsetSource(Protocol):
+    """A source of onsets."""
+
+    def began(self, t: float) -> bool:
+        """Whether a touch has begun since the last call, by a time of the loop's
+        clock."""
+
+
 class Periods:
     """Times between ticks, counted in bins of 10 us, so that a long run needs no more
     memory.
@@ -150,6 +158,7 @@ class Loop:
         skin: Skin,
         *,
         joints: JointSource | None = None,
+        onsets: OnsetSource | None = None,
         lasts_s: float = math.inf,
         stop: Stop | None = None,
     ) -> None:
@@ -158,11 +167,13 @@ class Loop:
         Args:
             skin: started.
             joints: asked for the angles at each frame's time.
+            onsets: asked for the onset of a touch.
             lasts_s: duration.
             stop: ends the loop early.
         """
         self.skin = skin
         self.joints = joints
+        self.onsets = onsets
         self.schedule = Schedule(skin.clock, skin.period_s)
         self._lasts = lasts_s
         self._stop = stop or Stop()
@@ -184,6 +195,8 @@ class Loop:
                 frame = self.skin.read()
                 if self.joints is not None:
                     frame = replace(frame, joints=self.joints.at(frame.t))
+                if self.onsets is not None:
+                    frame = replace(frame, onset=self.onsets.began(frame.t))
                 yield frame
         finally:
             gc.unfreeze()

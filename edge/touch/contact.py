@@ -183,14 +183,14 @@ class Contact:
         late: it was under way in the first frame.
         missing_taxels: a frame lacked taxels that are not known to be dead.
         missing_pose: a frame came without the joint angles that a feature needs.
-        region: the region when it was last seen.
+        region: the region when it was last seen; None where none was yet.
         joints: the joint angles (dof,) at that time; None where not known.
     """
 
     def __init__(
         self,
         onset_s: float,
-        region: Region,
+        region: Region | None,
         measurer: Measurer,
         chain: Chain | None,
     ) -> None:
@@ -327,6 +327,8 @@ class Contact:
         without an arm in that of the link that carries the skin. None where joint
         angles were not known.
         """
+        if self.region is None:
+            return None
         return self._located(self.region.centroid, self.joints)
 
     def series(self) -> FeatureSeries:

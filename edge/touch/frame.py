@@ -7,6 +7,10 @@ from numpy.typing import NDArray
 
 from edge.arrays import Booleans, Counts, Floats
 
+ONSETS = ("first", "event")
+"""What tells the onsets of touches other than the skin: the first frame of a recording,
+or an event."""
+
 
 @dataclass(frozen=True, slots=True)
 class Frame:
@@ -29,3 +33,5 @@ class Frame:
     shear: NDArray[np.int16] | None = None
     """(rows, cols, 2) tangential counts along the rows and around the columns; None on
     a skin of one axis."""
+    onset: bool = False
+    """A touch begins with this frame, as something other than the skin tells."""

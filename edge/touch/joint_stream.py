@@ -2,7 +2,8 @@
 
 A line is `{"t": 12.345, "q": [0.1, -0.2, ...]}`: seconds on the sender's clock, and one
 angle per joint in radians. A line may name its joints, `"names": ["elbow", ...]`; its
-angles are then put in the arm's order, and those of other joints are ignored. The
+angles are then put in the arm's order, and those of other joints are ignored. A line
+`{"onset": true}`, with angles or without, says that a touch begins. The
 sender's clock need not be ours. The quickest tenth of the recent lines gives the offset
 between the two clocks, and a line that took longer is older by the difference. With a
 line whose time goes back, everything begins anew: the sender's clock was set, or the
@@ -87,6 +88,8 @@ class Joints:
         self._recent: deque[float] = deque(maxlen=RECENT)
         """Arrival minus t of the last lines."""
         self._ended = False
+        self._began = False
+        """A line said that a touch begins, since `began` was asked."""
         self.malformed = 0
         """Number of lines that were not used."""
         self.problem = ""
@@ -115,6 +118,13 @@ class Joints:
             turned -= 2.0 * math.pi * np.round(turned / (2.0 * math.pi))
             return angles + (sent - before_s) / (after_s - before_s) * turned
         return angles if sent - before_s <= OLDEST_S else None
+
+    def began(self, t: float) -> bool:
+        """Whether a line has said, since the last call, that a touch begins."""
+        self._take()
+        began = self._began
+        self._began = False
+        return began
 
     def close(self) -> None:
         """Report the lines that were not used."""
@@ -153,28 +163,36 @@ class Joints:
 
     def _line(self, line: bytes, arrived: float) -> None:
         try:
-            t, angles = self._pose(line)
+            pose = self._pose(line)
         except InputError as error:
             return self._bad(str(error))
+        if pose is None:
+            return
+        t, angles = pose
         if self._poses and t <= self._poses[-1][0]:
             self._poses.clear()
             self._recent.clear()
         self._recent.append(arrived - t)
         self._poses.append((float(t), np.array(angles, dtype=np.float64)))
 
-    def _pose(self, line: bytes) -> tuple[float, list[float]]:
-        """Time and angles of a line, in the arm's order.
+    def _pose(self, line: bytes) -> tuple[float, list[float]] | None:
+        """Time and angles of a line, in the arm's order; None where it only says that a
+        touch begins.
 
         Raises:
             InputError: the line has none, or others than the arm's.
         """
         try:
             pose = parse_json(line, "a line")
+            begins = pose.get("onset") is True
+            self._began |= begins
+            if begins and "q" not in pose:
+                return None
             t = pose["t"]
             angles = list(pose["q"])
             if not {type(number) for number in (t, *angles)} <= {int, float}:
                 raise TypeError
-        except (InputError, KeyError, TypeError):
+        except (InputError, KeyError, TypeError, AttributeError):
             raise InputError('a line is not {"t": seconds, "q": [angles]}') from None
         names = pose.get("names")
         if names is not None and self._names is not None:

@@ -21,8 +21,9 @@ def shared(
     pairs = []
     for contact in contacts:
         for region in regions:
-            if contact.region.touches(region):
-                common = (contact.region.bits & region.bits).bit_count()
+            former = contact.region
+            if former is not None and former.touches(region):
+                common = (former.bits & region.bits).bit_count()
                 pairs.append((common, contact, region))
     shares: dict[Contact, Region] = {}
     for _, contact, region in sorted(pairs, key=itemgetter(0), reverse=True):

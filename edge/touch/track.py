@@ -47,10 +47,15 @@ class ContactTracker:
     one of them stays one contact. With the time, an arm that bounces off a rigid thing
     and comes back makes one contact.
 
+    With `outside`, the one contact begins with each frame that is an onset, whatever the skin
+    feels, and lasts for the horizon at least.
+
     Attributes:
         layout: the skin, with its thresholds.
         horizon_s: seconds from onset after which a contact's series takes in no more.
         max_contacts: how many are followed at once.
+        outside: whether something other than the skin tells the onset, as no more than
+            one contact at once can have.
         motion_on_skin: measure motion on the skin for a contact whose first frame has
             no joint angles, where this is set; else its motion is unknown in frames
             without them.
@@ -89,6 +94,7 @@ class ContactTracker:
         """
         if max_contacts < 1:
             raise InputError(f"max_contacts must be at least 1, not {max_contacts!r}")
+        self.outside = False
         self.layout = layout
         self.horizon_s = horizon_s
         self.motion_on_skin = False
@@ -122,6 +128,8 @@ class ContactTracker:
         )
         regions, shares = self._regions(active)
         self.region = regions[0] if regions else None
+        if self.outside:
+            return self._follow_from_outside(frame, active)
         for contact in self.contacts:
             self._follow(contact, frame, active, shares.get(contact))
         contacts = list(self.contacts)
@@ -144,6 +152,39 @@ class ContactTracker:
         valid = alive if frame.valid is None else alive & frame.valid
         return replace(frame, counts=frame.counts * alive, valid=valid)
 
+    def _follow_from_outside(self, frame: Frame, active: ActiveTaxels) -> list[Contact]:
+        """As `push`, where frames tell the onsets."""
+        region = self.region
+        ended = self.end() if frame.onset else []
+        if frame.onset:
+            chain = None if self._is_on_skin(frame) else self._chain
+            self.contacts = [Contact(frame.t, region, self._measurer, chain)]
+        for contact in self.contacts:
+            age_s = max(region_time(frame, region) - contact.onset_s, 0.0)
+            if frame.onset or contact.age_s < self.horizon_s:
+                contact.add(frame, active, region, age_s)
+            # Nothing has to confirm it.
+            contact.frames = max(contact.frames + 1, self._debounce)
+            if region is not None:
+                contact.touched_s = age_s
+            elif age_s > self.horizon_s:
+                touched_s = contact.touched_s
+                contact.ended = released(touched_s, age_s, self.layout.release_s)
+        contacts = self.contacts
+        self.contacts = [contact for contact in contacts if not contact.ended]
+        return ended + contacts
+
+    def end(self) -> list[Contact]:
+        """End the contact, and return it if it was confirmed. Of several contacts each
+        ends by itself."""
+        if self.max_contacts > 1:
+            return []
+        contacts = self.contacts
+        self.contacts = []
+        for contact in contacts:
+            contact.ended = True
+        return self._confirmed(contacts)
+
     def _confirmed(self, contacts: Sequence[Contact]) -> list[Contact]:
         """The contacts that have lasted long enough to count."""
         return [contact for contact in contacts if contact.frames >= self._debounce]
@@ -164,9 +205,12 @@ class ContactTracker:
         # The one contact is the largest region, wherever it lies.
         return [largest], dict.fromkeys(self.contacts, largest)
 
+    def _is_on_skin(self, frame: Frame) -> bool:
+        """Whether the motion of a contact that begins is measured on the skin."""
+        return self.motion_on_skin and frame.joints is None
+
     def _begin(self, frame: Frame, region: Region) -> Contact:
-        on_skin = self.motion_on_skin and frame.joints is None
-        chain = None if on_skin else self._chain
+        chain = None if self._is_on_skin(frame) else self._chain
         return Contact(region_time(frame, region), region, self._measurer, chain)
 
     def _follow(

@@ -78,6 +78,19 @@ def test_a_gap_in_the_window_flags_the_decision(model, make_touch):
     assert ["gap" in event.flags for event in events] == [True] * 2
 
 
+@pytest.mark.parametrize("repeats", [False, True])
+def test_frames_that_repeat_are_a_doubt_unless_those_of_training_did(model, repeats):
+    contact = SimpleNamespace(
+        missing_taxels=False, missing_pose=False, late=True, chain=None
+    )
+    felt = series(lambda t: 0.5 * RATE * t)
+    held = replace(felt, same=felt.t > 0.0)
+    info = replace(model.info, repeats=repeats, onset="first" * repeats)
+    doubts = contact_doubts(info, contact, held, 1.2)
+    assert doubts["frozen"] is not repeats
+    assert doubts["late"] is not repeats
+
+
 def test_joint_angles_are_compared_with_those_of_training(model):
     contact = SimpleNamespace(
         missing_taxels=False, missing_pose=False, late=False, chain=None

@@ -329,6 +329,7 @@ def test_what_c_lacks_is_one_sentence(tmp_path):
     info = model.info
     for change, sentence in (
         ({"layout": replace(info.layout, axes=3)}, "it takes no shear"),
+        ({"onset": "event"}, "by the skin alone"),
         ({"layout": replace(info.layout, rows=200)}, "the sums of 200 x 24 taxels"),
         ({"features": ("max_force_mean@200",)}, "more than 128 samples"),
     ):

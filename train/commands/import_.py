@@ -11,21 +11,22 @@ import os
 import re
 import sys
 from collections import Counter
-from collections.abc import Iterator, Sequence, Set
+from collections.abc import Collection, Iterator, Sequence, Set
 from dataclasses import replace
 from importlib import import_module
 from pathlib import Path
 
 from edge.errors import InputError, printable
-from edge.recording import Recording, load
+from edge.recording import Recording
 from edge.saving import save
 from edge.tools.trial_options import add_arm, open_arm
 from edge.touch.arm import Chain
 from edge.writing import remove_leftovers
 from train import former_recordings
 from train.data.broken import BrokenTaxels
-from train.data.thresholds import count_felt, proposed
+from train.data.thresholds import proposed
 from train.importers import Refused, Trial, names
+from train.importers.look import contacts_in, rows_of
 from train.progress import bar, say
 
 LOG = logging.getLogger(__name__)
@@ -45,9 +46,13 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         command.add_argument("file", type=Path, help="the file or folder")
         command.add_argument(
             "--out",
-            required=True,
             type=Path,
             help="folder for the recordings",
+        )
+        command.add_argument(
+            "--preview",
+            action="store_true",
+            help="show what was taken and five rows as understood, and write nothing",
         )
         add_arm(command, "to select and order a log's joint angles by name")
         if hasattr(module, "add_options"):
@@ -63,7 +68,10 @@ def run(arguments: argparse.Namespace) -> int:
         raise InputError(f"{arguments.file}: no such file or folder")
     if arguments.file.name in ("", ".."):  # a bag is a folder, perhaps the current one
         arguments.file = arguments.file.resolve()
-    remove_leftovers(arguments.out)
+    if not arguments.preview:
+        if arguments.out is None:
+            raise InputError("--out DIR is missing, the folder for the recordings")
+        remove_leftovers(arguments.out)
     importer = arguments.importer
     options = (arguments,) if hasattr(importer, "add_options") else ()
     first = FirstOfEachKind()
@@ -104,10 +112,10 @@ def write(
     arm: Chain | None,
     arguments: argparse.Namespace,
 ) -> int:
-    """Write the recordings of an importer; the exit status."""
-    without_threshold: list[tuple[Path, Recording]] = []
+    """Show a part of the recordings of an importer and write all of them; the exit
+    status."""
+    recordings: dict[str, Recording] = {}
     taxels = BrokenTaxels()
-    paths: set[Path] = set()
     skipped: list[str] = []
     for result in bar(trials, desc="importing", unit=" trials"):
         if isinstance(result, Refused):
@@ -116,32 +124,44 @@ def write(
         name, recording = result
         _require_joints(recording, arm, arguments.file)
         try:
-            path = _path(arguments, name, paths)
+            _check_name(arguments.file, name, recordings)
         except InputError as error:
             if getattr(arguments, "strict", True):
                 raise
             skipped.append(str(error))
             continue
-        paths.add(path)
+        recordings[name] = recording
         taxels.add(recording)
-        if "threshold_counts" in recording.meta["skin"]:
-            save(path, recording)
-        else:
-            without_threshold.append((path, recording))
-    if skipped and not paths:
+    if skipped and not recordings:
         raise InputError(skipped[0])
-    if without_threshold:
-        print(set_thresholds(without_threshold))
-    for warning in taxels.notes(load(min(paths)).layout) if paths else ():
-        say(warning)
+    _say_look(recordings, taxels)
+    if arguments.preview:
+        print("a preview: nothing is written")
+        return _status(None, set(), skipped)
+    paths = set()
+    for name, recording in recordings.items():
+        path = arguments.out / f"{name}.npz"
+        save(path, recording)
+        paths.add(path)
     print(f"recordings written to {arguments.out}: {len(paths)}")
     return _status(arguments.out, paths, skipped)
 
 
-def _status(folder: Path, paths: Set[Path], skipped: Sequence[str]) -> int:
-    """Say what else the folder holds, and what was left out; 1 if anything was."""
-    for warning in former_recordings.warnings(folder, paths):
+def _say_look(recordings: dict[str, Recording], taxels: BrokenTaxels) -> None:
+    """Show rows of the first recording, thresholds and contacts, and broken taxels."""
+    first = next(iter(recordings.values()))
+    for line in rows_of(first):
+        say(line)
+    print(with_thresholds(recordings))
+    for warning in taxels.notes(first.layout):
         say(warning)
+
+
+def _status(folder: Path | None, paths: Set[Path], skipped: Sequence[str]) -> int:
+    """Say what else the folder holds, and what was left out; 1 if anything was."""
+    if folder is not None:
+        for warning in former_recordings.warnings(folder, paths):
+            say(warning)
     for sentence in skipped:
         print(printable(f"skipped: {sentence}"), file=sys.stderr)
     return int(bool(skipped))
@@ -152,37 +172,42 @@ def _require_joints(recording: Recording, arm: Chain | None, file: Path) -> None
         raise InputError(f"{file}: holds no joint angles; leave --arm out")
 
 
-def _path(arguments: argparse.Namespace, name: str, paths: Set[Path]) -> Path:
-    """The file of a trial, which is none of those before it.
-
-    Raises:
-        InputError: the name is impossible, or taken.
-    """
-    path: Path = arguments.out / f"{name}.npz"
-    if not name or path.parent != arguments.out:
+def _check_name(file: Path, name: str, names: Collection[str]) -> None:
+    """Refuse the name of a trial that no file can have, or another trial has."""
+    if not name or Path(name).name != name:
         raise InputError(
-            f"{arguments.file}: the trial {name!r} needs a name that a file can have"
+            f"{file}: the trial {name!r} needs a name that a file can have"
         )
-    if path in paths:
-        raise InputError(
-            f"{arguments.file}: two trials are named {name}; rename one of them"
-        )
-    return path
+    if name in names:
+        raise InputError(f"{file}: two trials are named {name}; rename one of them")
 
 
-def set_thresholds(trials: Sequence[tuple[Path, Recording]]) -> str:
-    """Save trials with the thresholds that their noise suggests; returns a report."""
-    recordings = [recording for _, recording in trials]
-    proposal = proposed(recordings)
-    threshold = proposal.threshold
-    onset = proposal.onset
-    for path, recording in trials:
-        skin = {"threshold_counts": threshold, "onset_counts": onset}
-        meta = {**recording.meta, "skin": {**recording.meta["skin"], **skin}}
-        save(path, replace(recording, meta=meta))
-    touched = count_felt(recordings, onset)
-    return (
-        f"threshold {threshold} and onset {onset} counts, from "
-        f"{proposal.source}: {touched} of {len(trials)} have a contact; "
-        "`edge-classify thresholds` compares other thresholds"
-    )
+def with_thresholds(recordings: dict[str, Recording]) -> str:
+    """Give recordings without thresholds those that their noise suggests; a report on
+    thresholds and contacts."""
+    without = {
+        name: recording
+        for name, recording in recordings.items()
+        if "threshold_counts" not in recording.meta["skin"]
+    }
+    report = ""
+    if without:
+        proposal = proposed(list(without.values()))
+        report = (
+            f"threshold {proposal.threshold} and onset {proposal.onset} counts, from "
+            f"{proposal.source}: "
+        )
+        if not proposal.threshold:
+            report = (
+                f"threshold 0, so that any count is a contact: {proposal.source}; "
+                "record from before the touch, or give import --onset first, or "
+                "threshold_counts in skin.json; "
+            )
+        skin = {
+            "threshold_counts": proposal.threshold,
+            "onset_counts": proposal.onset,
+        }
+        for name, recording in without.items():
+            meta = {**recording.meta, "skin": {**recording.meta["skin"], **skin}}
+            recordings[name] = replace(recording, meta=meta)
+    return report + contacts_in(list(recordings.values()))

@@ -146,7 +146,9 @@ def follow(
 ) -> Followed:
     """The contacts of a recording, and the labels of those that are trials."""
     try:
-        tracker = ContactTracker(for_device(layout, recording.layout), **tracked)
+        layout = for_device(layout, recording.layout)
+        tracker = ContactTracker(layout, **tracked)
+        tracker.outside = recording.meta.get("onset") is not None
         touches = contacts(recording, tracker)
         return touches, labels_of(recording, len(touches))
     except InputError as error:

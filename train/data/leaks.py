@@ -41,8 +41,9 @@ def without_copies(recordings: Recordings) -> tuple[Recordings, list[str]]:
 
 
 def is_late(trial: Trial) -> bool:
-    """Whether a touch was under way in the first frame."""
-    return bool(trial.onset_s <= trial.recording.t[0])
+    """Whether a touch was under way in the first frame, and is not said to begin there."""
+    recording = trial.recording
+    return bool(trial.onset_s <= recording.t[0] and not recording.onsets_s)
 
 
 def late_share(dataset: DataSet) -> float:
@@ -57,7 +58,10 @@ def leaks(dataset: DataSet, y: Labels) -> list[str]:
     share = late_share(dataset)
     if share > 0.5:
         advice = "record from before the touch"
-        if proposed(recordings).onset > dataset.layout.onset:
+        onset = dataset.layout.onset
+        # A lower one was taken as it decides better.
+        is_recorded = onset >= recordings[0].layout.onset
+        if is_recorded and proposed(recordings).onset > onset:
             advice += ", or take higher thresholds (`edge-classify thresholds`)"
         return [
             f"warning: {share:.0%} of the touches begin with their "

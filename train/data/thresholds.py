@@ -71,7 +71,7 @@ def proposed(recordings: Sequence[Recording]) -> Proposal:
     if count_felt(touched, pair[1]) >= (1.0 - MISSED_SHARE) * len(touched):
         source = "the quietest taxels, as no recording has a part without contact"
         return Proposal(*pair, source)
-    source = "nothing to go by: no recording has a part without contact"
+    source = "no recording has a part without contact"
     return Proposal(0, 0, source)
 
 

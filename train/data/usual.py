@@ -1,16 +1,22 @@
 """How the training touches were made, against which the board doubts others.
 
-It compares the standstill of joints, and the speed at which the arm came.
+It compares frames that repeat, what tells the onset, the standstill of joints, and the
+speed at which the arm came.
 """
 
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from edge.errors import InputError
 from edge.touch.contact import FeatureSeries
+from edge.touch.doubts import frame_doubts
 from edge.touch.joint_doubts import still_times
 from train.data.dataset import DataSet
 
+OFTEN = 0.2
+"""Frames that repeat are no doubt if they did in so many of the trials."""
 SELDOM = 0.01
 """Share of the trials that may lie outside of a usual range, on one side."""
 SLOWER = 0.97
@@ -27,6 +33,9 @@ def usual_touches(dataset: DataSet, window_s: float) -> dict[str, Any]:
     """{field of `edge.model.info.ModelInfo`: what the training touches showed}."""
     series = [trial.series for trial in dataset.trials]
     usual: dict[str, Any] = {}
+    frozen = [frame_doubts(touch, window_s)["frozen"] for touch in series]
+    usual["repeats"] = bool(np.mean(frozen) >= OFTEN)
+    usual["onset"] = _onset(dataset)
     rests = [_still_times(touch, window_s) for touch in series]
     if any(rests):
         longest = np.quantile(rests, 1.0 - SELDOM, axis=0)
@@ -36,6 +45,25 @@ def usual_touches(dataset: DataSet, window_s: float) -> dict[str, Any]:
         low, high = np.nanquantile(speeds, (SELDOM, 1.0 - SELDOM))
         usual["speeds"] = SLOWER * float(low), FASTER * float(high) + RESTS
     return usual
+
+
+def _onset(dataset: DataSet) -> str:
+    """What tells the onsets of all trials, see `edge.model.info.ModelInfo`.
+
+    Raises:
+        InputError: it differs among the recordings.
+    """
+    sources: dict[str, Path] = {}
+    for trial in dataset.trials:
+        onset = trial.recording.meta.get("onset") or {"source": ""}
+        sources[onset["source"]] = trial.path
+    if len(sources) > 1:
+        first, second = list(sources.values())[:2]
+        raise InputError(
+            f"{first} and {second}: onsets come from {' and '.join(sorted(sources))}; "
+            "import all recordings with the same --onset or --onset-column"
+        )
+    return next(iter(sources))
 
 
 def _still_times(touch: FeatureSeries, window_s: float) -> list[float]:

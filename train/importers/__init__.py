@@ -1,5 +1,9 @@
 """Converts other labs' data to recordings, with one module for each format.
 
+Data goes through four rooms: a form (`forms/`: which of the known ones is the file, and
+its tables), columns (what each means), counts (rest, sign, scale, what is missing) and
+labels. Then a person has a look (`look`), and the recordings are written.
+
 A module `NAME.py` here adds `python -m train import NAME FILE --out DIR`. It has
 
     def trials(path: Path, arm: Chain | None = None) -> Iterator[Trial | Refused]
@@ -17,15 +21,15 @@ from typing import NamedTuple
 from edge.recording import Recording
 
 SHARED = {
-    "arrays",
     "axes",
     "clock",
     "columns",
     "counts",
+    "forms",
+    "labels",
+    "look",
     "options",
-    "reading",
-    "sources",
-    "tables",
+    "table",
     "topics",
 }
 """Modules that the formats share."""

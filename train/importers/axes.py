@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from edge.config import short_text
 from edge.errors import InputError
-from train.importers.tables import Table, numbered
+from train.importers.table import Table, numbered
 
 LETTERS = list("xyz")
 LAST = re.compile(r"(?P<word>.*?\d)(?P<rest>)[ _.-]*(?P<axis>[xyz])", re.I)

@@ -1,5 +1,5 @@
-"""What the columns of a table mean: times, taxels, joint angles, and what is left
-out."""
+"""What the columns of a table mean: times, taxels, joint angles, onsets, and what is
+left out."""
 
 import math
 import re
@@ -16,13 +16,21 @@ from edge.config import short_text
 from edge.errors import InputError
 from train.importers.axes import lettered
 from train.importers.options import UNITS_S, TableOptions
-from train.importers.tables import Table, numbered, numbers_of, require_converted
+from train.importers.table import Table, numbered, numbers_of, require_converted
 
-OTHER_UNITS = {"sec": "s", "seconds": "s", "µs": "us"}
-"""{another name of a unit: its name here}."""
+UNIT_NAMES = {
+    "s": "s sec second seconds",
+    "ms": "ms msec millis milliseconds",
+    "us": "us usec µs micros microseconds",
+    "ns": "ns nsec nanos nanoseconds",
+}
+"""{unit: its names}."""
+UNITS = {name: unit for unit, names in UNIT_NAMES.items() for name in names.split()}
 TIME = re.compile(
-    r"(?:t|time|timestamp|time_?stamp|stamp|seconds?|datetime)"
-    r"(?:[ _]*[\[(]?(?P<unit>s|sec|seconds|ms|us|µs|ns)[\])]?)?",
+    r"(?:(?:elapsed|relative|rel|system|sys|log|frame)[ _]*)?"
+    r"(?:ts|t|time|time_?stamp|stamp|clock|datetime)"
+    rf"(?:[ _]*[\[(]?(?P<unit>{'|'.join(UNITS)})[\])]?)?"
+    rf"|(?P<alone>{'|'.join(name for name in UNITS if len(name) > 4)})",
     re.IGNORECASE,
 )
 """Names of a column of times, with its unit if they tell it."""
@@ -73,8 +81,8 @@ class Meaning:
         """What all trials of a set have alike."""
         return f"time in {self.unit} and {len(self.taxels)} taxels {self.taxels}"
 
-    def text(self, label: str, shape: Sequence[int]) -> str:
-        """The columns used and ignored, in a line."""
+    def text(self, shape: Sequence[int]) -> str:
+        """The columns that were taken, in a line."""
         size = " x ".join(map(str, shape))
         text = f"taxels: {spanned(self.taxels)} ({len(self.taxels)}, as {size})"
         if self.time is not None:
@@ -83,9 +91,6 @@ class Meaning:
             )
         if self.joints:
             text += f", joint angles: {spanned(self.joints)}"
-        text += f", label: {label}"
-        if self.left_out:
-            text += f"; ignored: {', '.join(map(quoted, self.left_out))}"
         return text
 
 
@@ -123,8 +128,9 @@ def columns(table: Table, terms: str) -> list[str]:
 
 def _term(table: Table, term: str) -> list[str]:
     names = list(table.file_names) or table.names
-    if term in names:
-        return [term]
+    for all_names in (names, table.names):
+        if term in all_names:
+            return [term]
     array = [name for name in names if name.startswith(f"{term}.")]
     if array:
         return array
@@ -140,6 +146,18 @@ def _term(table: Table, term: str) -> list[str]:
     )
 
 
+def column(table: Table, option: str, terms: str) -> str:
+    """The column that an option names.
+
+    Raises:
+        InputError: it names several, or none of the file.
+    """
+    names = columns(table, terms)
+    if len(names) > 1:
+        raise InputError(f"{table.where}: {option} names several columns; name one")
+    return names[0]
+
+
 def meaning(table: Table, options: TableOptions) -> Meaning:
     """What the columns of a table are taken for.
 
@@ -153,16 +171,22 @@ def meaning(table: Table, options: TableOptions) -> Meaning:
     """
     joints = columns(table, options.joints) if options.joints else []
     time = _time_column(table, joints, options)
-    rest = [name for name in table.names if name != time and name not in joints]
+    used = {time, *joints}
+    if options.onset_column:
+        used.add(column(table, "--onset-column", options.onset_column))
+    rest = [name for name in table.names if name not in used]
     taxels, shape = _taxels(table, rest, options)
     for name in sorted(set(taxels).difference(rest)):
         raise InputError(
-            f"{table.where}: column {name} is named both as a taxel and as time or joint"
+            f"{table.where}: column {name} is named both as a taxel and as time, joint "
+            "or onset"
         )
     felt = set(taxels)
     left_out = [name for name in rest if name not in felt]
     unit, source = _unit(table, time, options)
-    is_told = any((table.named, table.shape, table.file_names, options.taxels))
+    is_told = any((table.named, table.shape, options.taxels))
+    # A form that makes the time, or a column of each taxel, knows what they are.
+    is_told |= time is not None and time not in (table.file_names or table.names)
     shape = table.shape or shape
     return Meaning(taxels, joints, left_out, shape, time, unit, source, not is_told)
 
@@ -174,39 +198,40 @@ def _time_column(
 ) -> str | None:
     """The column of times; None where --rate gives them."""
     if options.time:
-        times = columns(table, options.time)
-        if len(times) > 1:
-            raise InputError(f"{table.where}: --time names several columns; name one")
-    else:
-        times = named_times(table, joints)
-    if not times:
-        if options.rate is None:
+        if options.rate is not None:
             raise InputError(
-                f"{table.where}: no column is a time; give --rate HZ or --time COL"
+                f"{table.where}: --time and --rate tell one thing; give one"
             )
-        return None
+        return column(table, "--time", options.time)
     if options.rate is not None:
+        return None
+    times = named_times(table, joints)
+    if not times:
         raise InputError(
-            f"{table.where}: has a column of times, {quoted(times[0])}, beside --rate; "
-            "leave --rate out, or name another time by --time"
+            f"{table.where}: no column is a time; give --rate HZ, such as --rate 100, or "
+            f"--time COL, among {short_text(table.names)}"
         )
     return times[0]
 
 
 def named_times(table: Table, joints: Sequence[str] = ()) -> list[str]:
-    """The columns that are called a time, or else the only one of dates."""
-    named = filter(TIME.fullmatch, table.names)
-    times = [name for name in named if name not in joints]
+    """The column that is called a time, the one with most values where there are
+    several, or else the only one of dates."""
     dates = [name for name in table.names if is_date(table, name)]
-    return times or dates * (len(dates) == 1)
+    named = [n for n in filter(TIME.fullmatch, table.names) if n not in joints]
+    numbers = table.data.select_dtypes("number").columns
+    named = [name for name in named if name in dates or name in numbers] or named
+    if named:
+        return [max(named, key=lambda name: table.data[name].nunique())]
+    return dates * (len(dates) == 1)
 
 
 def is_date(table: Table, name: str) -> bool:
     """Whether a column holds times of the day, with dates or without."""
-    column = table.data[name]
-    if pd.api.types.is_numeric_dtype(column) or column.isna().any():
+    cells = table.data[name]
+    if pd.api.types.is_numeric_dtype(cells) or cells.isna().any():
         return False
-    return bool(DATE.match(str(column.iloc[0])))
+    return bool(DATE.match(str(cells.iloc[0])))
 
 
 def _taxels(
@@ -221,9 +246,10 @@ def _taxels(
     complete = [names for names in arrays if len(names) == math.prod(table.shape)]
     if table.shape and len(complete) == 1:
         return complete[0], ()
-    if rest and not table.named:
-        return rest, ()
     candidates = set(table.candidates)
+    if not table.named:
+        numbers = table.data.select_dtypes(["number", "bool"]).columns
+        return [name for name in rest if name in numbers] or rest, ()
     return _running(table, list(filter(candidates.__contains__, rest)))
 
 
@@ -238,8 +264,8 @@ def _running(table: Table, rest: Sequence[str]) -> tuple[list[str], tuple[int, .
     if grids:
         spans = " or ".join(spanned(names) for names, _ in grids)
         raise InputError(
-            f"{table.where}: are the taxels {spans}? Name them by --taxels, and joint "
-            "angles by --joints"
+            f"{table.where}: are the taxels {spans}? Name them by --taxels "
+            f"{grids[0][0][0]}-{grids[0][0][-1]}, and joint angles by --joints"
         )
     three = ", or --axes xyz for taxels of three axes" * any(map(lettered, rest))
     running = ",".join(filter(re.compile(RUNNING).match, rest))
@@ -280,13 +306,11 @@ def _unit(
     if time is None:
         return "s", "by --rate"
     name = TIME.fullmatch(time)
-    unit = options.time_unit or (name["unit"] if name else None)
+    stated = table.units.get(time) or (name and (name["unit"] or name["alone"]))
+    unit = options.time_unit or UNITS.get((stated or "").lower())
     if unit == "iso" or (unit is None and is_date(table, time)):
         return "iso", "times of the day"
-    if unit is None:
-        return _likely_unit(table, time)
-    unit = unit.lower()
-    return OTHER_UNITS.get(unit, unit), "as said"
+    return (unit, "as said") if unit else _likely_unit(table, time)
 
 
 def _likely_unit(table: Table, time: str) -> tuple[str, str]:
@@ -319,8 +343,8 @@ def times_of(
         rate_hz = options.rate or math.nan  # without a time there is a rate
         return np.asarray(np.arange(len(table.data)) / rate_hz)
     if meaning.unit == "iso":
-        column = table.data[meaning.time]
-        texts = column.astype(str).str.replace(MINUTES, r"00:\1", regex=True)
+        cells = table.data[meaning.time]
+        texts = cells.astype(str).str.replace(MINUTES, r"00:\1", regex=True)
         dates = pd.to_datetime(texts, errors="coerce", format="mixed", utc=True)
         require_converted(table, meaning.time, dates, "no time of the day")
         seconds = (dates - dates.iloc[0]).dt.total_seconds()
@@ -328,3 +352,16 @@ def times_of(
         numbers = numbers_of(table, meaning.time)
         seconds = (numbers - numbers.iloc[0]) * UNITS_S[meaning.unit]
     return np.asarray(seconds, dtype=np.float64)
+
+
+def onsets_of(
+    table: Table, options: TableOptions, t: NDArray[np.float64]
+) -> list[float]:
+    """The seconds at which touches begin by an option: the first frame's, or each at
+    which a column leaves the value that it begins with."""
+    if options.onset_column is None:
+        return [float(t[0])] if options.onset else []
+    name = column(table, "--onset-column", options.onset_column)
+    cells = table.data[name].astype(str).to_numpy()
+    left = cells != cells[0]
+    return [float(at) for at in t[1:][left[1:] & ~left[:-1]]]

@@ -2,6 +2,7 @@
 
 import logging
 import math
+import warnings
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Self
@@ -24,6 +25,13 @@ START = 3
 """Frames at the start of a trial, whose median may be the rest value."""
 MOST_COUNTS = 65535
 MOST_SHEAR = 32767
+OFFSET = 8.0
+"""Values rest away from 0 if they move by less than so many times what they rest at."""
+NOISE = 0.03
+DRIFT = 0.1
+"""Shares of it by which values at rest differ within a trial, and among trials."""
+LEAST_REST = 10.0
+"""Whole numbers that rest below it are counts with some noise."""
 CODES = (65535.0, 4095.0)
 """Numbers that some loggers write for a missing value, beside negative ones."""
 DECIMALS = 6
@@ -225,12 +233,51 @@ def rest_of(trials: Sequence[Samples], options: ValueOptions) -> Rest:
     rest = Rest(scale=options.scale)
     if options.falls or options.signed:
         rest = _moved(trials, options)
+    elif not (options.counts or codes):
+        _require_rest_at_zero(trials)
     refused = [trial for trial in trials if not rest.suits(trial)]
     if refused:
         rest = replace(rest, lacking=_lacking(refused, rest, codes))
     if 2 * len(refused) > len(trials):
         raise rest.refusal(refused[0])
     return rest
+
+
+def _require_rest_at_zero(trials: Sequence[Samples]) -> None:
+    """Refuse values that rest away from 0, alike in all trials, and move little.
+
+    Raises:
+        InputError: they do; the sentence names the option that subtracts the rest.
+    """
+    starts = np.array(
+        [trial.values[:START, :, 0] for trial in trials if len(trial.t) >= START]
+    )
+    if not len(starts):
+        return
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", RuntimeWarning)  # a taxel may lack all values
+        of_trials = np.nanmedian(starts, axis=1)
+        rest = np.nanmedian(of_trials, axis=0)
+        noise = np.nanmedian(abs(starts - of_trials[:, None]), axis=(0, 1))
+        drift = np.nanmedian(abs(of_trials - rest), axis=0)
+        level = float(np.nanmedian(rest))
+    moves = [trial.values[..., 0] - rest for trial in trials]
+    rise = max(np.fmax.reduce(move, axis=None, initial=0.0) for move in moves)
+    fall = -min(np.fmin.reduce(move, axis=None, initial=0.0) for move in moves)
+    steady = (noise < NOISE * rest) & (drift < DRIFT * rest)
+    whole = np.array_equal(starts, np.rint(starts), equal_nan=True)
+    least = LEAST_REST if whole else 0.0
+    if steady.mean() < 0.5 or level <= max(least, max(rise, fall) / OFFSET):
+        return
+    how = "rise: add --signed"
+    if 2.0 * fall > rise:
+        how = (
+            "fall: add --falls" if fall > 2.0 * rise else "rise and fall: add --signed"
+        )
+    raise InputError(
+        f"{trials[0].where}: values rest at {level:g} and {how}, which takes off the "
+        "rest; or add --counts, if the first frames are a touch"
+    )
 
 
 def _moved(trials: Sequence[Samples], options: ValueOptions) -> Rest:

@@ -3,23 +3,23 @@
 A folder holds a file for each trial: a row a frame, a column a taxel, and if you like
 columns of time and joint angles. Taxels are the columns whose names share a stem with
 running numbers (s1 to s16, taxel_0_3), all columns of a file without a header, or those
-that --taxels names; the columns used and ignored are printed. The label is the
-name of the folder that the file lies in (or of the one above folders that only count
-trials), or else its own name without the number at the end; `labels.csv`, with the
-column `trial` and one for each task, replaces it. A single file with a column `trial`
-holds all trials; its columns of text that stay the same within a trial are labels, and
-that of the task. Any file has such rows, or a row for each value in the columns `taxel`
-(or `sensor_id`) and `value`. COLS are names, ranges or numbers from 1, such as
-`s1-s9,force` or `3-5`. `skin.json` in the folder is the `skin` of the recordings. With
-`--frames`, a folder holds a folder for each trial, with a file for each frame: a line a
-row. A file that cannot be used is named and skipped. Taxels of three axes are columns
-such as s1_x, s1_y, s1_z, or three arrays: see --axes.
+that --taxels names; the columns used and ignored are printed. Labels come from
+`labels.csv` (a column `file`, and one for each task), or else from a column of texts,
+from the folder, or from the file's name; --label says which. A single file with a column
+`trial` holds all trials; its columns of text that stay the same within a trial are
+labels, and that of the task. Any file has such rows, or a row for each value in the
+columns `taxel` (or `sensor_id`) and `value`. COLS are names, ranges or numbers from 1,
+such as `s1-s9,force` or `3-5`. `skin.json` in the folder is the `skin` of the
+recordings. With `--frames`, a folder holds a folder for each trial, with a file for each
+frame: a line a row. A file that cannot be used is named and skipped. Taxels of three
+axes are columns such as s1_x, s1_y, s1_z, or three arrays: see --axes. The forms of
+files are those of train/importers/forms.
 """
 
 import argparse
-from collections.abc import Iterator, Sequence
+import math
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 from pathlib import Path
 from statistics import mode
 from typing import Any
@@ -34,21 +34,19 @@ from edge.touch.arm import Chain
 from edge.touch.layout import RELEASE_S
 from train.importers import Refused, Trial, clock
 from train.importers.axes import parted
-from train.importers.columns import Meaning, meaning, times_of
+from train.importers.columns import Meaning, meaning, onsets_of, quoted, times_of
 from train.importers.counts import Samples, rest_of, skin_shape
+from train.importers.forms import SUFFIXES, frames, tables_in, unread
+from train.importers.forms.file import inner
+from train.importers.labels import LABELS, Labels, Place, labels_of, texts_in
 from train.importers.options import TableOptions, add_table_options
-from train.importers.sources import SKIN, SUFFIXES, Source, sources_in, tried
+from train.importers.table import Table
 from train.json_files import json_table
 from train.progress import say
 
+SKIN = "skin.json"
 FEWEST_ROWS = 8
 """Rows of a trial from which on a column is seen to count them."""
-FEWEST_ALONE = 3
-"""Trials that may all have another label."""
-FIRST_WORDS = (
-    "this line, run in their folder, takes the first word of each name: (echo trial,%s; "
-    'for f in *_*; do echo "${f%%.*},${f%%%%_*}"; done) > labels.csv'
-)
 PANDAS = """\
 Where no option helps, five lines of pandas make a recording of a table:
 import edge, pandas
@@ -65,18 +63,18 @@ class Measured:
     """A trial whose columns are understood.
 
     Attributes:
-        name, labels, label: as those of its source.
+        place: what tells its labels.
         form: of its table.
         meaning: of the columns.
         samples: the numbers of the trial.
+        onsets: seconds at which touches begin, where an option tells them.
     """
 
-    name: str
-    labels: dict[str, str]
-    label: str
+    place: Place
     form: tuple[str, ...]
     meaning: Meaning
     samples: Samples
+    onsets: list[float]
 
 
 def trials(
@@ -92,120 +90,122 @@ def trials(
         InputError: there is no file, or one cannot be used with `--strict`.
     """
     options = TableOptions.of(arguments)
-    understood = partial(_understood, options=options)
-    results = list(tried(sources_in(path, options), understood, options.strict))
-    yield from (result for result in results if isinstance(result, Refused))
-    measured = [result for result in results if isinstance(result, Measured)]
+    folder = path if path.is_dir() else path.parent
+    files = _files(path, options)
+    measured: list[Measured] = []
+    for file in files:
+        for result in _tried(_measured(file, folder, options), options.strict):
+            if isinstance(result, Measured):
+                measured.append(result)
+            else:
+                yield result
     if measured:
-        yield from _recorded(path, arm, measured, options)
-    elif results:
+        yield from _recorded(folder, path.name, arm, measured, options)
+    elif files:
         for line in PANDAS.splitlines():
             say(line)
-    else:
-        files = f"file {', '.join(SUFFIXES)}, or folder of them with --frames"
-        raise InputError(f"{path}: holds no {files}; give a folder of trials")
 
 
-def _recorded(
-    path: Path,
-    arm: Chain | None,
-    measured: Sequence[Measured],
-    options: TableOptions,
-) -> Iterator[Trial | Refused]:
-    """The recordings of trials, without those whose columns are not those of most of
-    them; prints the columns used and ignored."""
-    kind = mode(trial.meaning.kind for trial in measured)
-    usable = [trial for trial in measured if trial.meaning.kind == kind]
-    folder = path if path.is_dir() else path.parent
-    skin = json_table(folder / SKIN)
-    if usable[0].meaning.are_all:
-        _require_taxels(usable)
-    shape = _announced(usable, skin, options)
-    rest = rest_of([trial.samples for trial in usable], options)
-
-    def recorded(trial: Measured) -> Trial:
-        if trial.meaning.kind != kind:
-            raise InputError(
-                f"{trial.samples.where}: has {trial.meaning.kind:.80}, and most have "
-                f"{kind:.80}; see --taxels and --time-unit"
-            )
-        meta: dict[str, Any] = {
-            "skin": skin.raw,
-            "labels": trial.labels,
-            "source": path.name,
-            "trial": trial.name,
-        }
-        if trial.samples.joints is not None:
-            meta["arm"] = arm and arm.to_dict()
-        return Trial(trial.name, rest.recording(trial.samples, shape, meta))
-
-    yield from tried(measured, recorded, options.strict)
-
-
-def _announced(
-    usable: Sequence[Measured],
-    skin: ConfigTable,
-    options: TableOptions,
-) -> tuple[int, int]:
-    """The rows and columns of the skin; prints the columns used and ignored, once for
-    all files."""
-    first = usable[0]
-    taxels = len(first.meaning.taxels)
-    in_skin = skin.whole("rows", 1), skin.whole("cols", taxels)
-    shape = skin_shape(first.samples, first.meaning.shape or in_skin, options)
-    say("; ".join([first.meaning.text(first.label, shape), *first.form]))
-    if options.axes is not None:
-        say(options.axes.text)
-    if len({str(trial.labels) for trial in usable}) == len(usable) > FEWEST_ALONE:
-        say(f"each trial has a label of its own; {FIRST_WORDS % options.task}")
-    return shape
-
-
-def _require_taxels(measured: Sequence[Measured]) -> None:
-    """Refuse columns without a name of which some count the rows or time, or tell the
-    trials apart.
+def _tried(items: Iterator[Any], strict: bool) -> Iterator[Any]:
+    """Some items; if what makes them refuses to go on, in the end why.
 
     Raises:
-        InputError: there is one.
+        InputError: it does, and the user is strict.
     """
-    values = [pd.DataFrame(trial.samples.values[..., 0]) for trial in measured]
-    if min(map(len, values)) < FEWEST_ROWS:
-        return
-    trials = pd.concat(values, keys=range(len(values))).groupby(level=0)
-    steps = trials.diff().dropna()
-    tells_apart = trials.first().nunique() > 1
-    doubtful = (steps > 0.0).all() | ((steps == 0.0).all() & tells_apart)
-    if doubtful.any() and not doubtful.all():
-        first = measured[0]
-        raise InputError(
-            f"{first.samples.where}: column {first.meaning.taxels[doubtful.argmax()]} "
-            "counts up, or tells the trials apart; name the taxels by --taxels"
-        )
+    try:
+        yield from items
+    except InputError as error:
+        if strict:
+            raise
+        yield Refused(str(error))
 
 
-def _understood(source: Source, options: TableOptions) -> Measured:
+def _files(path: Path, options: TableOptions) -> list[Path]:
+    """The files, or with `--frames` the folders, of trials.
+
+    Raises:
+        InputError: there is none; the sentence says what there is instead.
+    """
+    if not path.is_dir() and not options.frames:
+        return [path]
+    visible = [
+        place
+        for place in sorted(path.rglob("*"))
+        if not any(part.startswith(".") for part in place.relative_to(path).parts)
+    ]
+    if options.frames:
+        files = [place for place in visible if place.is_dir() and any(place.iterdir())]
+    else:
+        files = [
+            place
+            for place in visible
+            if inner(place).suffix.lower() in SUFFIXES
+            and place.name not in (LABELS, SKIN, "info.labels")
+        ]
+    if files:
+        return files
+    kinds = [place.suffix.lower() for place in visible]
+    for place, kind in zip(visible, kinds, strict=True):
+        if kind in unread.KINDS:
+            raise InputError(f"{place}: is {unread.KINDS[kind]}")
+    words = f"file {', '.join(SUFFIXES)}, or folder of them with --frames"
+    raise InputError(f"{path}: holds no {words}; give a folder of trials")
+
+
+def _measured(path: Path, folder: Path, options: TableOptions) -> Iterator[Any]:
+    """The trials in a file or folder of frames whose columns are understood, and why
+    others are not."""
+    place = path.relative_to(folder)
+    parts = place.parts if options.frames else inner(place).with_suffix("").parts
+    tables = frames.tables if options.frames else tables_in
+    for table in tables(path, options):
+        named = replace(table, name=table.name or "_".join(parts))
+        yield from _tried(map(_understood, [named], [place], [options]), options.strict)
+
+
+def _understood(table: Table, place: Path, options: TableOptions) -> Measured:
     """The numbers of a trial."""
     axes = options.axes
-    table = source.table if axes is None else parted(source.table, axes.normal)
-    sense = meaning(table, options)
-    t = times_of(table, sense, options)
-    samples = Samples.of(table.where, t, table.values(sense.taxels), axes)
+    normal = table if axes is None else parted(table, axes.normal)
+    sense = meaning(normal, options)
+    t = times_of(normal, sense, options)
+    samples = Samples.of(table.where, t, normal.values(sense.taxels), axes)
     if np.isnan(samples.values[..., 0]).all():
         raise InputError(f"{table.where}: none of its values is a finite number")
+    onsets = onsets_of(table, options, t)
     rows = table.data.index
     if sense.joints:
-        unit = np.pi / 180.0 if options.degrees else 1.0
-        angles = unit * table.numbers(sense.joints)
+        angles = _radians(normal, sense.joints, options)
         samples, rows = _with_joints(samples, rows, angles)
+    texts = texts_in(table)
     # Without the table, which would fill the memory a second time where it is long.
     return Measured(
-        source.name,
-        source.labels,
-        source.label,
-        source.table.form,
+        Place(table.name, place, table.labels, table.label, texts),
+        table.form,
         sense,
         samples.in_order(str(rows.name), rows),
+        [onset - t[0] for onset in onsets],
     )
+
+
+def _radians(
+    table: Table, joints: Sequence[str], options: TableOptions
+) -> NDArray[np.float64]:
+    """(rows, joints) angles.
+
+    Raises:
+        InputError: they are beyond a turn, and nothing says that they are in radians.
+    """
+    angles = table.numbers(joints)
+    if options.degrees:
+        return np.radians(angles)
+    largest = np.fmax.reduce(np.abs(angles), axis=None, initial=0.0)
+    if largest > 2.0 * math.pi and not options.radians:
+        raise InputError(
+            f"{table.where}: joint angles reach {largest:g}, beyond 2 pi: they are in "
+            "degrees (--degrees), or no angles (see --joints), or --radians of many turns"
+        )
+    return angles
 
 
 def _with_joints(
@@ -230,3 +230,103 @@ def _with_joints(
     )
     joints = clock.complete(at_frames, where)
     return Samples(where, t, samples.values[felt], joints), rows[felt]
+
+
+def _recorded(
+    folder: Path,
+    source: str,
+    arm: Chain | None,
+    measured: Sequence[Measured],
+    options: TableOptions,
+) -> Iterator[Trial | Refused]:
+    """The recordings of trials, without those whose columns are not those of most of
+    them; prints the columns used and ignored."""
+    kind = mode(trial.meaning.kind for trial in measured)
+    usable = [trial for trial in measured if trial.meaning.kind == kind]
+    others = {
+        "_".join(inner(p.relative_to(folder)).with_suffix("").parts)
+        for p in folder.rglob("*")
+    }
+    labels = labels_of([trial.place for trial in measured], folder, options, others)
+    yield from map(Refused, labels.slips)
+    skin = json_table(folder / SKIN)
+    if usable[0].meaning.are_all:
+        _require_taxels(usable)
+    shape = _announced(usable, skin, labels, options)
+    # What is cut at contact has no rest.
+    values = replace(options, counts=True) if options.onset else options
+    rest = rest_of([trial.samples for trial in usable], values)
+
+    def recorded(trial: Measured, labels: Mapping[str, str]) -> Trial:
+        if trial.meaning.kind != kind:
+            raise InputError(
+                f"{trial.samples.where}: has {trial.meaning.kind:.80}, and most have "
+                f"{kind:.80}; see --taxels and --time-unit"
+            )
+        meta: dict[str, Any] = {
+            "skin": skin.raw,
+            "labels": dict(labels),
+            "source": source,
+            "trial": trial.place.name,
+        }
+        if trial.samples.joints is not None:
+            meta["arm"] = arm and arm.to_dict()
+        if options.onset or options.onset_column:
+            meta["onset"] = {
+                "source": options.onset or "event",
+                "times_s": trial.onsets,
+            }
+        return Trial(trial.place.name, rest.recording(trial.samples, shape, meta))
+
+    for trial, trial_labels in zip(measured, labels.of, strict=True):
+        if trial.place.name not in labels.left_out:
+            yield from _tried(map(recorded, [trial], [trial_labels]), options.strict)
+
+
+def _announced(
+    usable: Sequence[Measured],
+    skin: ConfigTable,
+    labels: Labels,
+    options: TableOptions,
+) -> tuple[int, int]:
+    """The rows and columns of the skin; prints the columns used and ignored, once for
+    all files."""
+    first = usable[0]
+    taxels = len(first.meaning.taxels)
+    in_skin = skin.whole("rows", 1), skin.whole("cols", taxels)
+    shape = skin_shape(first.samples, first.meaning.shape or in_skin, options)
+    ignored = [name for name in first.meaning.left_out if name not in labels.columns]
+    parts = [f"{first.meaning.text(shape)}, label: {labels.source}"]
+    if ignored:
+        parts.append(f"ignored: {', '.join(map(quoted, ignored))}")
+    if options.onset_column:
+        count = sum(len(trial.onsets) for trial in usable)
+        parts.append(f"onset: column {options.onset_column}, {count} times")
+    say("; ".join([*parts, *first.form]))
+    if options.axes is not None:
+        say(options.axes.text)
+    if labels.warning:
+        say(labels.warning)
+    return shape
+
+
+def _require_taxels(measured: Sequence[Measured]) -> None:
+    """Refuse columns without a name of which some count the rows or time, or tell the
+    trials apart.
+
+    Raises:
+        InputError: there is one.
+    """
+    values = [pd.DataFrame(trial.samples.values[..., 0]) for trial in measured]
+    if min(map(len, values)) < FEWEST_ROWS:
+        return
+    trials = pd.concat(values, keys=range(len(values))).groupby(level=0)
+    steps = trials.diff().dropna()
+    tells_apart = trials.first().nunique() > 1
+    doubtful = (steps > 0.0).all() | ((steps == 0.0).all() & tells_apart)
+    if doubtful.any() and not doubtful.all():
+        first = measured[0]
+        raise InputError(
+            f"{first.samples.where}: column {first.meaning.taxels[doubtful.argmax()]} "
+            "counts up, or tells the trials apart; name the taxels by --taxels"
+        )

@@ -47,6 +47,11 @@ def add_value_options(parser: argparse.ArgumentParser) -> None:
         action="store_true",
         help="values rise and fall: count how far they are from those at rest",
     )
+    sense(
+        "--counts",
+        action="store_true",
+        help="values are counts as they stand, though they do not rest near 0",
+    )
     add(
         "--scale",
         type=within(float, 1e-12, 1e12),
@@ -100,8 +105,32 @@ def add_table_options(parser: argparse.ArgumentParser) -> None:
     )
     add("--taxels", metavar="COLS", help="the taxels (default: by running numbers)")
     add("--joints", metavar="COLS", help="joint angles in radians")
-    add("--degrees", action="store_true", help="joint angles are in degrees")
+    angle = parser.add_mutually_exclusive_group().add_argument
+    angle("--degrees", action="store_true", help="joint angles are in degrees")
+    angle(
+        "--radians",
+        action="store_true",
+        help="joint angles are in radians, though beyond 2 pi",
+    )
+    onset = parser.add_mutually_exclusive_group().add_argument
+    onset(
+        "--onset-column",
+        metavar="COL",
+        help="a touch begins where this column leaves its first value: a gripper's "
+        "command, or a marker",
+    )
+    onset(
+        "--onset",
+        choices=["first"],
+        help="a touch begins with the first frame of each recording",
+    )
     add("--axis", type=within(int, 1, 4), help="axis of time of arrays, from 1")
+    add(
+        "--label",
+        metavar="N|folder|COL",
+        help="where labels are: the N-th word of each file's name, the folder's name, or "
+        "a column",
+    )
     add(
         "--task",
         default="object",
@@ -118,6 +147,7 @@ class ValueOptions:
     shape: tuple[int, int] | None = None
     falls: bool = False
     signed: bool = False
+    counts: bool = False
     scale: float = 1.0
     missing: float | None = None
     axes: Axes | None = None
@@ -146,6 +176,10 @@ class TableOptions(ValueOptions):
     taxels: str | None = None
     joints: str | None = None
     degrees: bool = False
+    radians: bool = False
+    onset_column: str | None = None
+    onset: str | None = None
+    label: str | None = None
     axis: int | None = None
     task: str = "object"
     strict: bool = False

@@ -23,7 +23,7 @@ from edge.recording import Recording
 from edge.touch.arm import Chain
 from edge.touch.layout import RELEASE_S, SkinLayout
 from train.importers import Trial, clock
-from train.importers.reading import read_unpacked
+from train.importers.forms.file import read_unpacked
 
 PADS = (1, 5)
 """The matrices that touch: the distal pads of the two fingers that close. In 3 of 856

@@ -256,3 +256,14 @@ def arrived(source):
 
 def udp():
     return socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+
+
+def test_a_line_may_say_that_a_touch_begins(wire):
+    assert not wire.joints.began(0.0)
+    wire.data = b'{"onset": true}\n'
+    assert wire.joints.began(0.1)
+    assert not wire.joints.began(0.2)
+    wire.send(1.0, [0.1, 0.2], onset=True)
+    assert wire.at() == [0.1, 0.2]
+    assert wire.joints.began(0.3)
+    assert wire.joints.malformed == 0

@@ -213,3 +213,27 @@ def test_a_clock_too_large_for_its_steps_is_refused_and_says_so():
     for t in (1.7e12, -1e15):
         with pytest.raises(InputError, match="give seconds"):
             followed(FLAT, [pressed(FLAT, t, {})])
+
+
+def test_a_touch_may_begin_by_an_event_before_it_is_felt():
+    tracker = ContactTracker(FLAT, horizon_s=0.5)
+    tracker.outside = True
+    contacts = []
+    for i in range(120):
+        t = 0.01 * i
+        taxels = {(3, 3): 200} if 40 <= i < 60 else {}
+        frame = pressed(FLAT, t, taxels, onset=i in (20, 100))
+        contacts += [c for c in tracker.push(frame) if c not in contacts]
+    assert [contact.onset_s for contact in contacts] == pytest.approx([0.2, 1.0])
+    first = contacts[0].series()
+    assert first.t[first.area > 0][0] == pytest.approx(0.2)
+    assert contacts[0].ended
+    assert contacts[0].touched_s == pytest.approx(0.39)
+    assert not contacts[1].ended
+
+
+def test_without_an_event_no_touch_begins():
+    tracker = ContactTracker(FLAT)
+    tracker.outside = True
+    frames = [pressed(FLAT, 0.01 * i, {(3, 3): 200}) for i in range(9)]
+    assert [tracker.push(frame) for frame in frames] == [[]] * 9

@@ -57,7 +57,8 @@ def test_warnings_that_are_alike_are_counted(make_touch, tmp_path, capsys):
     (tmp_path / "csv" / "skin.json").write_text('{"threshold_counts": 90}')
     out = tmp_path / "out"
     leftover = left_by_a_dead_run(out)
-    main(["import", "csv", str(tmp_path / "csv"), "--frames", "--out", str(out)])
+    words = ["import", "csv", str(tmp_path / "csv"), "--frames", "--counts"]
+    main([*words, "--out", str(out)])
     assert not leftover.exists()
     lines = capsys.readouterr().err.splitlines()
     (warning,) = [line for line in lines if "its first frame is above" in line]

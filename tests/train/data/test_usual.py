@@ -5,10 +5,11 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from edge.errors import InputError
 from train.data.usual import FASTER, RESTS, SLOWER, usual_touches
 
 
-def touch(speed, rest=0, joints=True):
+def touch(speed, rest=0, joints=True, repeats=0, onset=""):
     """A series of a second at 10 Hz, in which the second of two joints rests for so many
     frames."""
     n = 11
@@ -16,7 +17,11 @@ def touch(speed, rest=0, joints=True):
     if joints:
         moving = np.arange(n, dtype=float)
         series.joints = np.stack([moving, np.maximum(moving - rest, 0.0)], axis=1)
-    return SimpleNamespace(series=series)
+    series.same = (np.arange(n) > 0) & (np.arange(n) <= repeats)
+    series.area = np.ones(n, int)
+    meta = {"onset": {"source": onset}} if onset else {}
+    recording = SimpleNamespace(meta=meta)
+    return SimpleNamespace(series=series, recording=recording, path=f"{onset}.npz")
 
 
 def usual(trials):
@@ -32,4 +37,19 @@ def test_the_standstill_and_the_speeds_are_those_of_nearly_all_trials():
 
 
 def test_without_joint_angles_nothing_is_said_of_them():
-    assert usual([touch(np.nan, joints=False)] * 3) == {}
+    keys = usual([touch(np.nan, joints=False)] * 3).keys()
+    assert keys == {"repeats", "onset"}
+
+
+@pytest.mark.parametrize(("repeating", "repeats"), [(1, False), (2, True)])
+def test_frames_that_repeat_in_a_fifth_of_the_trials_are_usual(repeating, repeats):
+    trials = [touch(1.0, repeats=10 * (i < repeating)) for i in range(10)]
+    assert usual(trials)["repeats"] is repeats
+
+
+def test_all_onsets_come_from_one_source():
+    trials = [touch(1.0, onset="event")] * 3
+    assert usual(trials)["onset"] == "event"
+    assert usual([touch(1.0)] * 3)["onset"] == ""
+    with pytest.raises(InputError, match="event.npz and .npz"):
+        usual([*trials, touch(1.0)])

@@ -5,9 +5,9 @@ import pandas as pd
 import pytest
 
 from edge.errors import InputError
-from train.importers.columns import meaning, times_of
+from train.importers.columns import meaning, onsets_of, times_of
 from train.importers.options import TableOptions
-from train.importers.tables import Table
+from train.importers.table import Table
 
 COUNTS = np.arange(5)
 
@@ -85,21 +85,24 @@ def test_columns_are_named_by_names_ranges_and_places(terms, names):
 @pytest.mark.parametrize(
     ("wishes", "sentence"),
     [
-        ({"taxels": "s3"}, r"a.csv: has no column s3; it has \['s1', 's2'\]"),
+        ({"taxels": "s3"}, r"a.csv: has no column s3; it has \['t', 's1', 's2'\]"),
         ({"taxels": "s1,s1"}, "named twice"),
-        ({"taxels": "s1-s2", "joints": "s2"}, "both as a taxel and as time or joint"),
+        ({"taxels": "s1-s2", "joints": "s2"}, "both as a taxel and as time"),
         ({"time": "s1,s2"}, "--time names several columns"),
     ],
 )
 def test_contradictions_are_refused(wishes, sentence):
     with pytest.raises(InputError, match=sentence):
-        sense_of(table("s1", "s2"), rate=10, **wishes)
+        sense_of(table("t", "s1", "s2"), time_unit="s", **wishes)
 
 
-def test_a_rate_beside_a_time_is_refused_and_neither_too():
-    with pytest.raises(InputError, match="beside --rate"):
-        sense_of(table("t", "s1"), rate=10)
-    with pytest.raises(InputError, match="no column is a time; give --rate"):
+def test_a_rate_is_taken_before_a_column_and_one_of_them_is_needed():
+    sense = sense_of(table("t", "s1"), rate=10)
+    assert sense.time is None
+    assert sense.left_out == ["t"]
+    with pytest.raises(InputError, match="--time and --rate"):
+        sense_of(table("t", "s1"), rate=10, time="t")
+    with pytest.raises(InputError, match="give --rate"):
         sense_of(table("s1"))
 
 
@@ -155,7 +158,35 @@ def test_what_is_no_date_is_named():
 def test_a_line_says_what_was_taken():
     source = table("t", *(f"p{i}" for i in range(1, 17)), "label", "column 3")
     sense = sense_of(source, time_unit="ms")
-    assert sense.text("folder", (4, 4)) == (
-        'time: "t" in ms (as said), taxels: "p1" to "p16" (16, as 4 x 4), label: folder; '
-        'ignored: "label", "column 3"'
+    assert sense.text((4, 4)) == (
+        'time: "t" in ms (as said), taxels: "p1" to "p16" (16, as 4 x 4)'
     )
+
+
+@pytest.mark.parametrize(
+    ("names", "time", "unit"),
+    [
+        (["millis"], "millis", "ms"),
+        (["Elapsed Time (s)"], "Elapsed Time (s)", "s"),
+        (["micros", "Date"], "micros", "us"),
+        (["ts"], "ts", "s"),
+    ],
+)
+def test_a_time_is_told_by_its_name(names, time, unit):
+    source = table("s1", **dict.fromkeys(names, 0.01 * COUNTS))
+    sense = sense_of(source)
+    assert sense.time == time
+    assert sense.unit == unit
+
+
+def test_of_two_times_the_finer_is_taken():
+    assert sense_of(table("s1", time=COUNTS // 3, millis=10 * COUNTS)).time == "millis"
+
+
+def test_a_touch_begins_where_a_column_leaves_its_first_value():
+    source = table("s1", grip=["open", "shut", "shut", "open", "shut"])
+    options = TableOptions(rate=10, onset_column="grip")
+    assert onsets_of(source, options, 0.1 * COUNTS) == pytest.approx([0.1, 0.4])
+    assert meaning(source, options).left_out == []
+    assert onsets_of(source, TableOptions(onset="first"), 0.1 * COUNTS) == [0.0]
+    assert onsets_of(source, TableOptions(), 0.1 * COUNTS) == []

@@ -150,3 +150,41 @@ def test_a_number_that_stands_for_missing_values_is_named_and_may_be_told(capsys
 def test_another_text_is_no_shape(text):
     with pytest.raises(argparse.ArgumentTypeError, match="must be ROWSxCOLS"):
         shape_of_skin(text)
+
+
+def raw(rest, touch, n=40):
+    """A trial of three taxels with some noise, of which one is touched."""
+    values = rest + np.random.default_rng(1).integers(-1, 2, (n, 3))
+    values[n // 2 :, 0] += touch
+    return trial(*values)
+
+
+@pytest.mark.parametrize(
+    ("rest", "touch", "option"),
+    [
+        (700, 150, "--signed"),
+        (700, -500, "--falls"),
+        (245, -15, "--falls"),
+        (700, 3000, "--signed"),
+    ],
+)
+def test_values_that_rest_away_from_0_are_refused_with_the_option(rest, touch, option):
+    trials = [raw(rest, touch), raw(rest + 5, touch)]
+    with pytest.raises(InputError) as error:
+        rest_of(trials, ValueOptions())
+    assert f"add {option}," in str(error.value)
+    assert rest_of(trials, ValueOptions(counts=True)).values is None
+    assert rest_of(trials, ValueOptions(**{option[2:]: True})).values is not None
+
+
+@pytest.mark.parametrize(
+    "trials",
+    [
+        [raw(3, 900), raw(4, 900)],
+        [raw(30, 900)],
+        [raw(100, 150), raw(300, 150), raw(500, 150)],  # in contact from the start
+        [trial([700, 700])],
+    ],
+)
+def test_counts_that_rest_near_0_or_begin_in_contact_are_taken(trials):
+    assert rest_of(trials, ValueOptions()).values is None

@@ -435,3 +435,22 @@ def test_labels_and_the_names_of_trials_stand_as_they_are(folder):
     assert {
         name: trial.labels["object"] for name, trial in recordings.items()
     } == labels
+
+
+def test_angles_beyond_a_turn_are_degrees_or_said_to_be_radians(folder, refused):
+    put(folder, {"cup_1.csv": "t,s1,q\n0,1,90\n0.1,2,91\n"})
+    words = ("--taxels", "s1", "--joints", "q")
+    assert "--degrees" in refused("csv", folder, *words)
+    _, recordings = imported(folder, *words, "--degrees")
+    assert recordings["cup_1"].joints[0, 0] == pytest.approx(np.pi / 2)
+    _, recordings = imported(folder, *words, "--radians")
+    assert recordings["cup_1"].joints[0, 0] == 90.0
+
+
+def test_onsets_from_outside_are_kept(folder):
+    put(folder, {"cup_1.csv": "t,s1,grip\n0,1,0\n0.1,2,0\n0.2,2,1\n0.3,2,1\n"})
+    _, recordings = imported(folder, "--onset-column", "grip")
+    onset = recordings["cup_1"].meta["onset"]
+    assert onset == {"source": "event", "times_s": [pytest.approx(0.2)]}
+    _, recordings = imported(folder, "--onset", "first")
+    assert recordings["cup_1"].meta["onset"] == {"source": "first", "times_s": [0.0]}

@@ -2,6 +2,7 @@
 
 import json
 import shutil
+import struct
 from types import SimpleNamespace
 
 import numpy as np
@@ -29,6 +30,7 @@ from tests.train.importers.ros import (
     write_mcap,
 )
 from train.__main__ import main
+from train.importers import rosbag
 from train.importers.axes import Axes
 from train.importers.options import LogOptions
 from train.importers.topics import Log
@@ -322,3 +324,37 @@ def test_what_is_no_log_is_one_sentence(tmp_path, refused, name, contents, sente
     if contents is not None:
         path.write_bytes(contents)
     assert sentence in refused("rosbag", path)
+
+
+def record(code, *contents):
+    """A record of MCAP: numbers of two bytes, and texts behind their lengths."""
+    data = b""
+    for content in contents:
+        is_text = isinstance(content, str)
+        data += (
+            struct.pack("<I", len(content)) + content.encode() if is_text else content
+        )
+    return struct.pack("<BQ", code, len(data)) + data
+
+
+@pytest.mark.parametrize(
+    ("profile", "encoding", "word"),
+    [
+        ("", "protobuf", "protobuf (maker.Skin on /skin)"),
+        ("ros2", "flatbuffer", "flatbuffer"),
+        ("", "cdr", "another profile"),
+    ],
+)
+def test_messages_that_are_not_of_ros_2_are_named(
+    tmp_path, refused, profile, encoding, word
+):
+    one = struct.pack("<H", 1)
+    start = rosbag.MAGIC + record(1, profile, "me")
+    summary = record(3, one, "maker.Skin", encoding, "") + record(
+        4, one, one, "/skin", encoding, ""
+    )
+    footer = record(2, struct.pack("<QQI", len(start), 0, 0))
+    (tmp_path / "a.mcap").write_bytes(start + summary + footer + rosbag.MAGIC)
+    message = refused("rosbag", tmp_path / "a.mcap")
+    assert word in message
+    assert "copy it again" not in message

@@ -1,10 +1,9 @@
-"""Tables whose columns are not yet understood: their cells as numbers, and what no
-table may lack."""
+"""Tables whose columns are not yet understood."""
 
 from collections import Counter, defaultdict
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 import pandas as pd
@@ -24,23 +23,31 @@ class Table:
         where: names the file, and the trial in it, in errors.
         data: a column for each; columns without a header are named "1", "2" and so on.
             Its index is called `line`, and counts the lines of a text, or `row`.
+        name: of the trial, where the file tells it.
         named: the file has a header.
-        decimal: the sign before a fraction, in cells that are text.
         shape: of the skin, where the file tells it.
         form: how the file was read, where that is worth saying.
         file_names: the names of all columns of the file, in its order, where they are
             not those of `data`.
+        units: {column: unit} where the file has a row of them.
+        labels: {task: label} that the file tells.
+        label: where they stand in it; empty where it tells none.
     """
 
     where: str
     data: pd.DataFrame
+    name: str = ""
     named: bool = True
-    decimal: str = "."
     shape: tuple[int, ...] = ()
     form: tuple[str, ...] = ()
     file_names: tuple[str, ...] = ()
+    units: Mapping[str, str] = field(default_factory=dict)
+    labels: Mapping[str, str] = field(default_factory=dict)
+    label: str = ""
 
     def __post_init__(self) -> None:
+        if self.data.empty:
+            raise InputError(f"{self.where}: {EMPTY}")
         if self.data.index.name is None:
             self.data.index = pd.RangeIndex(1, len(self.data) + 1, name="row")
 
@@ -90,11 +97,6 @@ def numbered(stem: str, count: int) -> list[str]:
     return [f"{stem}.{number}".strip(".") for number in range(1, count + 1)]
 
 
-def place_of(mask: pd.Series) -> str:
-    """The first row of a table that a mask names, in words."""
-    return f"{mask.index.name} {mask.idxmax()}"
-
-
 def numbers_of(table: Table, name: str) -> pd.Series:
     """A column as numbers; empty cells are NaN.
 
@@ -102,8 +104,8 @@ def numbers_of(table: Table, name: str) -> pd.Series:
         InputError: a cell is no number, or one beyond measure.
     """
     column = table.data[name]
-    if table.decimal == "," and not pd.api.types.is_numeric_dtype(column):
-        column = column.str.replace(",", ".", n=1)
+    if not pd.api.types.is_numeric_dtype(column):
+        column = column.astype(object).replace(",", ".", regex=True)
     numbers = pd.to_numeric(column, errors="coerce").astype("float64")
     numbers = numbers.where(np.isfinite(numbers))
     require_converted(table, name, numbers, "no number")
@@ -119,9 +121,10 @@ def require_converted(table: Table, name: str, converted: pd.Series, kind: str) 
     column = table.data[name]
     bad = converted.isna() & column.notna()
     if bad.any():
-        cell = str(column[bad].iloc[0])
+        cell = short_text(str(column[bad].iloc[0]))
         raise InputError(
-            f"{table.where}: {short_text(cell)} in column {name} is {kind} ({place_of(bad)})"
+            f"{table.where}: {cell} in column {name} is {kind} "
+            f"({bad.index.name} {bad.idxmax()})"
         )
 
 
@@ -136,14 +139,15 @@ def require_unique(names: Iterable[str]) -> None:
             raise InputError(f"two columns are named {name}; rename one of them")
 
 
-def require_filled(path: object, data: pd.DataFrame, name: str) -> None:
+def require_filled(table: Table, name: str) -> None:
     """Refuse a table with an empty cell in a column that tells its rows apart.
 
     Raises:
         InputError: a cell is empty; the sentence names its line.
     """
-    empty = data[name].isna()
+    empty = table.data[name].isna()
     if empty.any():
         raise InputError(
-            f"{path}: {place_of(empty)} has no {name}; enter it, or leave the row out"
+            f"{table.where}: {empty.index.name} {empty.idxmax()} has no {name}; enter "
+            "it, or leave the row out"
         )

@@ -3,9 +3,8 @@
 import io
 import math
 import zipfile
-from collections import defaultdict
-from collections.abc import Iterator, Mapping, Sequence
-from pathlib import Path
+from collections.abc import Iterator
+from dataclasses import replace
 from typing import Any, BinaryIO
 
 import numpy as np
@@ -15,42 +14,67 @@ from scipy.io import loadmat, whosmat
 
 from edge.config import short_text
 from edge.errors import InputError, about
-from edge.files import parsing, read_bytes
+from edge.files import parsing
 from train.importers.columns import TIME
+from train.importers.forms.file import File
 from train.importers.options import TableOptions
-from train.importers.reading import LARGEST_BYTES
-from train.importers.tables import EMPTY, Table, needs, numbered, require_unique
+from train.importers.table import EMPTY, Table, needs, numbered, require_unique
 
 SUFFIXES = (".npy", ".npz", ".mat", ".h5", ".hdf5")
 MOST_VALUES = 1 << 25
 """Values of all arrays of a file; on the way to counts each takes 37 bytes."""
-Arrays = dict[str, NDArray[Any]]
+Arrays = dict[str, Any]
 Labelled = tuple[dict[str, str], Arrays]
 """The labels and the arrays of a trial."""
 
 
-def read_arrays(path: Path) -> Arrays:
-    """{name: array} of a file, which is "" in an .npy file.
+def is_form(file: File) -> bool:
+    """Whether the suffix is that of arrays."""
+    return file.suffix in SUFFIXES
+
+
+def tables(file: File, options: TableOptions) -> Iterator[Table]:
+    """The arrays as one trial, or as several with `--trials`.
+
+    Raises:
+        InputError: the arrays do not tell which axis is the time, or the trial.
+    """
+    where = str(file.path)
+    stored = read_arrays(file)
+    if not options.trials:
+        with about(where):
+            yield table_of(where, stored, options)
+        return
+    with about(where):
+        trials = list(trials_of(stored, options.task))
+    for number, (labels, arrays) in enumerate(trials):
+        name = f"{file.path.stem}_{number:03}"
+        trial = f"{where}: trial {name}"
+        with about(trial):
+            table = table_of(trial, arrays, options)
+        label = "the arrays" if labels else ""
+        yield replace(table, name=name, labels=labels, label=label)
+
+
+def read_arrays(file: File) -> Arrays:
+    """{name: array, or likewise a structure or group} of a file; an .npy file has one
+    array, "".
 
     Raises:
         InputError: the file cannot be read, or is too large.
     """
-    data = read_bytes(path, LARGEST_BYTES)
-    file = io.BytesIO(data)
-    with parsing(str(path), "a table", "; save it as text"), about(str(path)):
-        suffix = path.suffix.lower()
-        if suffix == ".npy":
-            stored = {"": np.lib.format.read_array(file)}
-            _check_size(stored[""].size)
-        elif suffix == ".npz":
-            stored = _npz(file)
-        elif suffix == ".mat" and not data.startswith(b"MATLAB 7.3"):
-            stored = _mat(file)
-        else:
-            stored = _hdf5(file)
-    return {
-        name: array for name, array in stored.items() if isinstance(array, np.ndarray)
-    }
+    data = io.BytesIO(file.data)
+    where = str(file.path)
+    with parsing(where, "arrays", "; save them again"), about(where):
+        if file.suffix == ".npy":
+            array = np.lib.format.read_array(data)
+            _check_size(array.size)
+            return {"": array}
+        if file.suffix == ".npz":
+            return _npz(data)
+        if file.suffix == ".mat" and not file.data.startswith(b"MATLAB 7.3"):
+            return _mat(data)
+        return _hdf5(data)
 
 
 def _npz(file: BinaryIO) -> Arrays:
@@ -68,7 +92,7 @@ def _npz(file: BinaryIO) -> Arrays:
 
 def _mat(file: BinaryIO) -> Arrays:
     _check_size(sum(math.prod(shape) for _, shape, _ in whosmat(file)))
-    contents = loadmat(file)
+    contents = loadmat(file, simplify_cells=True)
     return {name: value for name, value in contents.items() if name[:2] != "__"}
 
 
@@ -94,7 +118,11 @@ def _hdf5(file: BinaryIO) -> Arrays:
 
     def collect(name: str, item: Any) -> None:
         if isinstance(item, h5py.Dataset) and not name.startswith("#"):
-            arrays[name.replace("/", ".")] = value(item)
+            *groups, last = name.split("/")
+            place = arrays
+            for group in groups:
+                place = place.setdefault(group, {})
+            place[last] = value(item)
 
     with h5py.File(file, "r") as stored:
         stored.visititems(collect)
@@ -147,19 +175,20 @@ def table_of(where: str, arrays: Arrays, options: TableOptions) -> Table:
     return Table(where, data, named="" not in numbers, shape=shape, form=tuple(form))
 
 
-def _numbers(arrays: Arrays, options: TableOptions) -> Arrays:
-    """The arrays of numbers that are used.
+def _numbers(arrays: Arrays, options: TableOptions) -> dict[str, NDArray[Any]]:
+    """The arrays of numbers that are used, those of structures by their path.
 
     Raises:
         InputError: there is none.
     """
+    flat = _flat(arrays)
     words = filter(None, (options.taxels, options.joints, options.time))
-    named = set(",".join(words).split(",")) & set(arrays)
+    named = set(",".join(words).split(",")) & set(flat)
     if not options.taxels or not named:
-        named = set(arrays)
+        named = set(flat)
     named.add("trial")
     numbers = {}
-    for name, array in arrays.items():
+    for name, array in flat.items():
         is_used = name in named or TIME.fullmatch(name)
         if is_used and array.dtype.kind in "iufb" and array.size:
             numbers[name] = array.ravel() if _is_vector(array) else array
@@ -168,37 +197,44 @@ def _numbers(arrays: Arrays, options: TableOptions) -> Arrays:
     return numbers
 
 
+def _flat(arrays: Arrays, stem: str = "") -> dict[str, NDArray[Any]]:
+    """The arrays of structures within structures, by their path."""
+    flat: dict[str, NDArray[Any]] = {}
+    for name, value in arrays.items():
+        if isinstance(value, dict):
+            flat |= _flat(value, f"{stem}{name}.")
+        elif isinstance(value, np.ndarray):
+            flat[stem + name] = value
+    return flat
+
+
 def _is_vector(array: NDArray[Any]) -> bool:
     """Whether an array is a number, or a vector as MATLAB stores it: a matrix of one
     row or column."""
     return array.ndim == 0 or (array.ndim == 2 and 1 in array.shape)
 
 
-def _frames(arrays: Arrays, axis: int | None, time: str | None) -> int:
+def _frames(arrays: dict[str, NDArray[Any]], axis: int | None, time: str | None) -> int:
     """The number of frames: that of the times, or what all arrays share. A single array
     has its longest axis first."""
     for name, array in arrays.items():
         if array.ndim == 1 and (name == time or TIME.fullmatch(name)):
             return array.size
+    largest = max(arrays.values(), key=np.size)
     if axis is not None:
-        return _frames_along(axis, max(arrays.values(), key=np.size))
-    sizes = {name or "the array": array.shape for name, array in arrays.items()}
-    shared = set.intersection(*map(set, sizes.values()))
+        if axis >= largest.ndim:
+            raise InputError(f"--axis must be 1 to {largest.ndim}")
+        return int(largest.shape[axis])
+    shared = set.intersection(*(set(array.shape) for array in arrays.values()))
     if len(arrays) == 1:
-        (shape,) = sizes.values()
-        shared = {shape[0]} & {max(shape)}
+        shared = {largest.shape[0]} & {max(largest.shape)}
     if len(shared) == 1:
         return int(shared.pop())
+    sizes = {name or "the array": array.shape for name, array in arrays.items()}
     raise InputError(
         f"which axis is the time? The arrays are {short_text(sizes)}; give --axis, or name "
         "those to be used by --taxels and --joints"
     )
-
-
-def _frames_along(axis: int, largest: NDArray[Any]) -> int:
-    if axis >= largest.ndim:
-        raise InputError(f"--axis must be 1 to {largest.ndim}")
-    return int(largest.shape[axis])
 
 
 def _time_axis(title: str, array: NDArray[Any], frames: int, axis: int | None) -> int:
@@ -219,7 +255,7 @@ def _time_axis(title: str, array: NDArray[Any], frames: int, axis: int | None) -
     return places[0]
 
 
-def trials_of(arrays: Arrays, task: str) -> Iterator[Labelled]:
+def trials_of(stored: Arrays, task: str) -> Iterator[Labelled]:
     """The labels and arrays of each trial of a file that holds several.
 
     Trials are the groups or structures of the file, the entries of a cell array or of a
@@ -230,80 +266,43 @@ def trials_of(arrays: Arrays, task: str) -> Iterator[Labelled]:
     Raises:
         InputError: the arrays do not share an axis of trials.
     """
-    trials = list(map(_fields, _groups(arrays).values()))
-    if len(trials) < 2 or len({frozenset(dict(fields)) for fields in trials}) > 1:
-        entries = _entries(arrays)
-        columns = zip(*entries.values(), strict=True)
-        trials = [
-            _fields(dict(zip(entries, column, strict=True))) for column in columns
-        ]
-    for fields in trials:
-        require_unique(name for name, _ in fields)
-        yield _labels_and_arrays(fields, task)
+    for fields in _trials(stored):
+        labels = {}
+        arrays = {}
+        for name, field in fields.items():
+            value = np.asarray(field)
+            if value.size > 1 and value.dtype.kind not in "US":
+                arrays[name] = value
+            elif value.size and not isinstance(value.item(), dict):
+                is_label = name.lower() in ("label", "labels")
+                labels[task if is_label else name] = _text(value.item())
+        yield labels, arrays
 
 
-def _labels_and_arrays(
-    fields: Sequence[tuple[str, NDArray[Any]]], task: str
-) -> Labelled:
-    """A trial's texts and single numbers, and its arrays."""
-    labels: dict[str, str] = {}
-    of_trial: Arrays = {}
-    for path, value in fields:
-        if value.dtype.names:  # a structure within it is no value
-            continue
-        if value.size == 1:  # without the array that MATLAB puts around a value
-            value = np.asarray(value.item())
-        name = path.rpartition(".")[2]
-        if value.ndim == 0 or value.dtype.kind in "US":
-            is_label = name.lower() in ("label", "labels")
-            labels[task if is_label else name] = _text(value)
-        else:
-            of_trial[name] = value
-    return labels, of_trial
-
-
-def _text(value: NDArray[Any]) -> str:
-    """A text or a number as a label; HDF5 gives texts as UTF-8 bytes."""
-    if value.ndim == 0 and isinstance(value.item(), bytes):
-        return str(value.item(), "utf-8", "replace")
-    return str(value)
-
-
-def _groups(arrays: Arrays) -> dict[str, Arrays]:
-    """The arrays of each group, or of each structure."""
-    groups: dict[str, Arrays] = defaultdict(dict)
-    for path, array in arrays.items():
-        group, _, name = path.rpartition(".")
-        is_structure = array.dtype.names and array.size == 1
-        groups[path if is_structure else group][name] = array
-    return groups
-
-
-def _fields(trial: Mapping[str, Any]) -> list[tuple[str, NDArray[Any]]]:
-    """The names and values of a trial, with the fields of its structures."""
-    fields = []
-    for name, stored in trial.items():
-        value = np.asarray(stored)
-        names = value.dtype.names
-        if names and value.size == 1:
-            fields += [(field, np.asarray(value[field].item())) for field in names]
-        else:
-            fields.append((name, value))
-    return fields
-
-
-def _entries(arrays: Arrays) -> Arrays:
-    """The entries of each array, one for each trial."""
-    entries = {}
-    for name, array in arrays.items():
-        is_list = array.dtype.hasobject or _is_vector(array)
-        entries[name] = array.ravel() if is_list else array
-    sizes = {name: len(values) for name, values in entries.items()}
+def _trials(stored: Arrays) -> list[Arrays]:
+    """The structures or groups of a file, or the entries of each of its arrays."""
+    values = list(stored.values())
+    while len(values) == 1 and isinstance(values[0], dict):
+        stored = values[0]
+        values = list(stored.values())
+    if len(values) == 1 and np.asarray(values[0]).dtype.hasobject:
+        values = list(values[0])
+    keys = {frozenset(value) if isinstance(value, dict) else None for value in values}
+    if len(values) > 1 and len(keys) == 1 and None not in keys:
+        return values
+    lists = {name: list(np.atleast_1d(array)) for name, array in stored.items()}
+    sizes = {name: len(entries) for name, entries in lists.items()}
     if not any(sizes.values()):
         raise InputError(EMPTY)
     if len(set(sizes.values())) != 1:
         raise InputError(
-            f"its arrays have {short_text(sizes)} trials; leave out the arrays that do not "
-            "have one entry for each trial"
+            f"its arrays have {short_text(sizes)} trials; leave out the arrays that do "
+            "not have one entry for each trial"
         )
-    return entries
+    rows = zip(*lists.values(), strict=True)
+    return [dict(zip(lists, row, strict=True)) for row in rows]
+
+
+def _text(value: Any) -> str:
+    """A text or a number as a label; HDF5 gives texts as UTF-8 bytes."""
+    return str(value, "utf-8", "replace") if isinstance(value, bytes) else str(value)

@@ -5,8 +5,9 @@ import pytest
 from scipy.io import savemat
 
 from edge.errors import InputError
-from train.importers import arrays
-from train.importers.arrays import read_arrays, table_of, trials_of
+from train.importers.forms import arrays
+from train.importers.forms.arrays import read_arrays, table_of, trials_of
+from train.importers.forms.file import File
 from train.importers.options import TableOptions
 
 OPTIONS = TableOptions()
@@ -113,7 +114,7 @@ def of_cells_in_matlab_7_3(path):
 
 def trials_in(path):
     """The labels and the frames of the trials of a file."""
-    trials = list(trials_of(read_arrays(path), "object"))
+    trials = list(trials_of(read_arrays(File(path)), "object"))
     frames = [arrays["frames"].tolist() for _, arrays in trials]
     assert frames == [FRAMES.tolist(), (FRAMES + 1).tolist()]
     return [labels for labels, _ in trials]
@@ -136,17 +137,10 @@ def test_trials_are_cells_structures_groups_or_a_first_axis(tmp_path, write):
     assert trials_in(path) == [{"object": "cup"}, {"object": "pen"}]
 
 
-def test_fields_of_one_name_in_two_structures_are_refused(tmp_path):
-    skin = {"frames": FRAMES, "name": "x"}
-    savemat(tmp_path / "a.mat", {"skin": skin, "info": {"name": "y", "place": "z"}})
-    with pytest.raises(InputError, match="two columns are named name"):
-        list(trials_of(read_arrays(tmp_path / "a.mat"), "object"))
-
-
 def test_a_structure_within_a_trial_is_left_out(tmp_path):
     trial = {"frames": FRAMES, "camera": {"maker": "x", "lens": np.arange(3)}}
     savemat(tmp_path / "a.mat", {"trials": np.array([trial, trial], dtype=object)})
-    trials = list(trials_of(read_arrays(tmp_path / "a.mat"), "object"))
+    trials = list(trials_of(read_arrays(File(tmp_path / "a.mat")), "object"))
     assert [labels for labels, _ in trials] == [{}, {}]
     assert [list(arrays) for _, arrays in trials] == [["frames"], ["frames"]]
 
@@ -182,7 +176,9 @@ def test_an_empty_data_set_of_hdf5_is_left_out(tmp_path):
     with h5py.File(tmp_path / "a.h5", "w") as file:
         file["hand/skin"] = FRAMES
         file["note"] = h5py.Empty("f")
-    assert list(read_arrays(tmp_path / "a.h5")) == ["hand.skin"]
+    assert list(table_of("", read_arrays(File(tmp_path / "a.h5")), OPTIONS).arrays) == [
+        "hand.skin"
+    ]
 
 
 @pytest.mark.parametrize("suffix", [".npy", ".npz", ".mat", ".h5"])
@@ -190,4 +186,4 @@ def test_what_would_fill_the_memory_is_refused_before(tmp_path, suffix, monkeypa
     path = written(tmp_path / f"a{suffix}", np.zeros((100, 100), np.uint8))
     monkeypatch.setattr(arrays, "MOST_VALUES", 5000)
     with pytest.raises(InputError, match="values, more than the 5000 that are read"):
-        read_arrays(path)
+        read_arrays(File(path))

@@ -1,0 +1,268 @@
+"""The labels of trials: those of labels.csv, or else those that the files tell, by a
+column of texts, by their names, or by their folders."""
+
+import re
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from io import StringIO
+from pathlib import Path
+
+import pandas as pd
+
+from edge.config import short_text
+from edge.errors import InputError
+from edge.files import parsing
+from train.importers.forms.file import File, inner
+from train.importers.forms.long import plain
+from train.importers.forms.text import is_number
+from train.importers.options import TableOptions
+from train.importers.table import Table
+
+LABELS = "labels.csv"
+LABEL = re.compile(r"labels?|class(?:[ _]?name)?|category|target|object|material", re.I)
+"""Names of a column that holds labels."""
+NUMBERED = re.compile(r"(?:trial|rec|recording|run|take|sample|test)?[\s_.-]*\d+", re.I)
+"""Names of folders that only count trials."""
+LABEL_AND_ID = re.compile(r"([^.]*[^\W\d_][^.]*)\.[\w.-]+")
+"""A name of Edge Impulse: LABEL.ID, or LABEL.ID.MORE."""
+COUNT = r"[\s_.-]*\(?\d+\)?$"
+"""A number at the end of a name."""
+FEWEST_ALONE = 3
+"""Trials that may all have another label."""
+NONE = "none, as the files' names only count"
+
+
+@dataclass(frozen=True)
+class Place:
+    """What tells the labels of a trial.
+
+    Attributes:
+        name: of the trial.
+        path: of its file, or folder of frames, from the folder of all.
+        labels, label: that the file's own form tells, see `Table`.
+        texts: {column: text} of those that hold one text in all rows; "" where a column
+            of labels holds several.
+    """
+
+    name: str
+    path: Path
+    labels: Mapping[str, str] = field(default_factory=dict)
+    label: str = ""
+    texts: Mapping[str, str] = field(default_factory=dict)
+
+    @property
+    def stem(self) -> str:
+        """The file's name without its suffix."""
+        return inner(self.path).stem if self.path.suffix else self.path.name
+
+
+@dataclass(frozen=True)
+class Labels:
+    """The labels of trials.
+
+    Attributes:
+        of: {task: label} of each trial, in their order.
+        source: where they come from, in words.
+        columns: of labels.
+        slips: a sentence for each row of labels.csv, or trial, that has no partner.
+        left_out: the names of trials that labels.csv leaves out.
+    """
+
+    of: Sequence[Mapping[str, str]]
+    source: str
+    columns: frozenset[str] = frozenset()
+    slips: Sequence[str] = ()
+    left_out: frozenset[str] = frozenset()
+
+    @property
+    def warning(self) -> str:
+        """A sentence where each trial has a label of its own; else empty."""
+        texts = [str(labels) for labels in self.of]
+        if not FEWEST_ALONE < len(set(texts)) == len(texts):
+            return ""
+        return (
+            f"each trial has a label of its own, by {self.source}; --label 1 takes the "
+            "first word of each name, --label folder the folder's, and a file labels.csv "
+            "(columns file and object) tells them one by one"
+        )
+
+
+def texts_in(table: Table) -> dict[str, str]:
+    """The `texts` of a `Place`."""
+    texts = {}
+    for name, cells in table.data.items():
+        is_text = not pd.api.types.is_numeric_dtype(cells)
+        is_label = LABEL.fullmatch(str(name))
+        filled = cells.dropna().unique() if is_text or is_label else []
+        if len(filled) == 1:
+            texts[str(name)] = plain(filled[0])
+        elif len(filled) and is_text and is_label:
+            texts[str(name)] = ""
+    return texts
+
+
+def labels_of(
+    places: Sequence[Place], folder: Path, options: TableOptions, others: Iterable[str]
+) -> Labels:
+    """The labels of trials, by labels.csv where the folder has one.
+
+    Args:
+        places: of the trials.
+        folder: of their files.
+        options: of the command.
+        others: names of the files that are no trials.
+
+    Raises:
+        InputError: labels.csv is damaged or names none of the trials, or an option
+            names a column or word that is not there.
+    """
+    told = _told(places, options)
+    path = folder / LABELS
+    if not path.is_file():
+        return told
+    rows = read_rows(path)
+    names = [place.name for place in places]
+    if not set(names) & rows.keys():
+        raise InputError(
+            f"{path}: needs a column file with names such as {short_text(names)}"
+        )
+    slips = [
+        f"{path}: {name} names no file"
+        for name in rows
+        if name not in {*names, *others}
+    ]
+    slips += [
+        f"{path}: has no row for {name}, which has no label"
+        for name in names
+        if name not in rows
+    ]
+    table = []
+    for place in places:
+        row = dict(rows.get(place.name, {}))
+        table.append({**place.labels, **row})
+    left_out = {name for name, row in rows.items() if row.pop("left_out", "")}
+    return Labels(table, LABELS, slips=slips, left_out=frozenset(left_out))
+
+
+def read_rows(path: Path) -> dict[str, dict[str, str]]:
+    """{file without its suffix: {column: text}} of a labels.csv.
+
+    Raises:
+        InputError: it cannot be read, has no column file or trial, or a row twice.
+    """
+    file = File(path)
+    with parsing(str(path), "a table of labels", "; save it as CSV"):
+        mark = max(",;\t", key=file.lines[0].count)
+        text = StringIO("\n".join(file.lines))
+        data = pd.read_csv(text, sep=mark, dtype=str, keep_default_na=False)
+    key = next((name for name in ("file", "trial") if name in data), None)
+    if key is None:
+        raise InputError(f"{path}: needs a column file, beside one for each task")
+    rows: dict[str, dict[str, str]] = {}
+    for line, row in enumerate(data.to_dict("records"), 2):
+        name = re.sub(r"\.(?:npz|csv|txt|json|npy|mat)$", "", row.pop(key).strip())
+        if not name:
+            raise InputError(f"{path}: line {line} has no {key}; enter it")
+        if name in rows:
+            raise InputError(f"{path}: {name} has two rows; remove one of them")
+        rows[name.replace("/", "_")] = {
+            task: label for task, label in row.items() if label
+        }
+    return rows
+
+
+def _told(places: Sequence[Place], options: TableOptions) -> Labels:
+    """The labels that the files tell."""
+    if options.label:
+        return _stated(places, options.label, options.task)
+    if any(place.label for place in places):
+        return Labels([place.labels for place in places], places[0].label)
+    columns = {}
+    for name in dict.fromkeys(name for place in places for name in place.texts):
+        if _is_label(name, [place.texts.get(name) for place in places], places):
+            columns[name] = options.task if LABEL.fullmatch(name) else name
+    if not columns:
+        return _by_name(places, options.task)
+    of = []
+    for place in places:
+        of.append(
+            {
+                task: place.texts[name]
+                for name, task in columns.items()
+                if name in place.texts
+            }
+        )
+    return Labels(of, f"column {', column '.join(columns)}", frozenset(columns))
+
+
+def _is_label(name: str, texts: Sequence[str | None], places: Sequence[Place]) -> bool:
+    """Whether a column of texts is one of labels: it is called so, or some of its texts
+    are those of several trials.
+
+    Raises:
+        InputError: it is called so, and changes within a trial.
+    """
+    different = set(texts)
+    is_called = bool(LABEL.fullmatch(name))
+    if "" in different:
+        raise InputError(
+            f"{places[texts.index('')].path}: column {name} changes within the file; part "
+            "it there, or tell labels otherwise, such as by --label 1 or --label folder"
+        )
+    if all(text is None or is_number(text) for text in texts):
+        return is_called and len(different) > 1
+    return is_called or 1 < len(different) < len(texts)
+
+
+def _stated(places: Sequence[Place], label: str, task: str) -> Labels:
+    """The labels that `--label` tells: a word of the names, a folder, or a column."""
+    of = []
+    for place in places:
+        words = re.split(r"[\s_.-]+", place.stem)
+        text = place.texts.get(label)
+        if label == "folder":
+            text = place.path.parent.name
+        elif label.isdigit() and text is None:
+            text = dict(enumerate(words, 1)).get(int(label))
+        if not text:
+            raise InputError(
+                f"{place.path}: has no label by --label {label}: the words of its name "
+                f"are {short_text(words)}, its texts {short_text(dict(place.texts))}"
+            )
+        of.append({task: text})
+    kind = {"folder": "the folder's name"}.get(label, f"column {label}")
+    kind = f"word {label} of the file's name" if label.isdigit() else kind
+    return Labels(of, kind, frozenset([label]))
+
+
+def _by_name(places: Sequence[Place], task: str) -> Labels:
+    """The labels that the names of files and folders tell."""
+    counting = _counting([place.path for place in places])
+    ids = [LABEL_AND_ID.fullmatch(place.stem) for place in places]
+    of = []
+    sources = []
+    for place, match in zip(places, ids, strict=True):
+        source = "the folder's name"
+        names = [part for part in place.path.parts[:-1] if part not in counting]
+        if not names and all(ids) and match:
+            source = "the file's name before the first dot"
+            names = [match[1]]
+        elif not names:
+            source = "the file's name without the number at its end"
+            names = [re.sub(COUNT, "", place.stem)]
+        of.append({task: names[-1]} if names[-1] else {})
+        sources.append(f'{source}, such as "{names[-1]}"' if names[-1] else NONE)
+    return Labels(of, sources[0])
+
+
+def _counting(paths: Sequence[Path]) -> set[str]:
+    """The names of folders that only count trials: words such as trial_1, and on each
+    level below the first, names that differ in their numbers alone."""
+    counting = set()
+    for level in range(max(len(path.parts) for path in paths)):
+        names = {path.parts[level] for path in paths if path.parts[level + 1 :]}
+        stems = {re.sub(r"[\d\W_]+$", "", name) for name in names}
+        if level and len(stems) == 1 and stems.isdisjoint(names):
+            counting |= names
+        counting |= set(filter(NUMBERED.fullmatch, names))
+    return counting
