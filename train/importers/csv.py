@@ -30,6 +30,7 @@ from numpy.typing import NDArray
 
 from edge.config import ConfigTable
 from edge.errors import InputError
+from edge.labels import TABLE
 from edge.touch.arm import Chain
 from edge.touch.layout import RELEASE_S
 from train.importers import Refused, Trial, clock
@@ -38,7 +39,7 @@ from train.importers.columns import Meaning, meaning, onsets_of, quoted, times_o
 from train.importers.counts import Samples, rest_of, skin_shape
 from train.importers.forms import SUFFIXES, frames, tables_in, unread
 from train.importers.forms.file import inner
-from train.importers.labels import LABELS, Labels, Place, labels_of, texts_in
+from train.importers.labels import Labels, Place, labels_of, texts_in
 from train.importers.options import TableOptions, add_table_options
 from train.importers.table import Table
 from train.json_files import json_table
@@ -140,7 +141,7 @@ def _files(path: Path, options: TableOptions) -> list[Path]:
             place
             for place in visible
             if inner(place).suffix.lower() in SUFFIXES
-            and place.name not in (LABELS, SKIN, "info.labels")
+            and place.name not in (TABLE, SKIN, "info.labels")
         ]
     if files:
         return files

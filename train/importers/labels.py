@@ -4,21 +4,19 @@ column of texts, by their names, or by their folders."""
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
-from io import StringIO
 from pathlib import Path
 
 import pandas as pd
 
 from edge.config import short_text
 from edge.errors import InputError
-from edge.files import parsing
-from train.importers.forms.file import File, inner
+from edge.labels import TABLE, read_table
+from train.importers.forms.file import inner
 from train.importers.forms.long import plain
 from train.importers.forms.text import is_number
 from train.importers.options import TableOptions
 from train.importers.table import Table
 
-LABELS = "labels.csv"
 LABEL = re.compile(r"labels?|class(?:[ _]?name)?|category|target|object|material", re.I)
 """Names of a column that holds labels."""
 NUMBERED = re.compile(r"(?:trial|rec|recording|run|take|sample|test)?[\s_.-]*\d+", re.I)
@@ -117,58 +115,37 @@ def labels_of(
             names a column or word that is not there.
     """
     told = _told(places, options)
-    path = folder / LABELS
-    if not path.is_file():
+    table = read_table(folder, "trial")
+    if not table.contents:
         return told
-    rows = read_rows(path)
+    rows = {}
+    for file, row in table.rows.items():
+        name = re.sub(r"\.(?:npz|csv|txt|json|npy|mat)$", "", file).replace("/", "_")
+        if name in rows:
+            raise InputError(f"{table.path}: {name} has two rows; remove one of them")
+        rows[name] = row
     names = [place.name for place in places]
     if not set(names) & rows.keys():
         raise InputError(
-            f"{path}: needs a column file with names such as {short_text(names)}"
+            f"{table.path}: needs a column file with names such as {short_text(names)}"
         )
     slips = [
-        f"{path}: {name} names no file"
-        for name in rows
+        f"{table.path}, line {row.line}: {name} names no file"
+        for name, row in rows.items()
         if name not in {*names, *others}
     ]
     slips += [
-        f"{path}: has no row for {name}, which has no label"
+        f"{table.path}: has no row for {name}, which has no label"
         for name in names
         if name not in rows
     ]
-    table = []
+    labels = []
     for place in places:
-        row = dict(rows.get(place.name, {}))
-        table.append({**place.labels, **row})
-    left_out = {name for name, row in rows.items() if row.pop("left_out", "")}
-    return Labels(table, LABELS, slips=slips, left_out=frozenset(left_out))
-
-
-def read_rows(path: Path) -> dict[str, dict[str, str]]:
-    """{file without its suffix: {column: text}} of a labels.csv.
-
-    Raises:
-        InputError: it cannot be read, has no column file or trial, or a row twice.
-    """
-    file = File(path)
-    with parsing(str(path), "a table of labels", "; save it as CSV"):
-        mark = max(",;\t", key=file.lines[0].count)
-        text = StringIO("\n".join(file.lines))
-        data = pd.read_csv(text, sep=mark, dtype=str, keep_default_na=False)
-    key = next((name for name in ("file", "trial") if name in data), None)
-    if key is None:
-        raise InputError(f"{path}: needs a column file, beside one for each task")
-    rows: dict[str, dict[str, str]] = {}
-    for line, row in enumerate(data.to_dict("records"), 2):
-        name = re.sub(r"\.(?:npz|csv|txt|json|npy|mat)$", "", row.pop(key).strip())
-        if not name:
-            raise InputError(f"{path}: line {line} has no {key}; enter it")
-        if name in rows:
-            raise InputError(f"{path}: {name} has two rows; remove one of them")
-        rows[name.replace("/", "_")] = {
-            task: label for task, label in row.items() if label
-        }
-    return rows
+        of_row = rows[place.name].labels if place.name in rows else {}
+        merged = {**place.labels, **of_row}
+        labels.append({task: label for task, label in merged.items() if label})
+    left_out = frozenset(name for name, row in rows.items() if row.left_out)
+    return Labels(labels, TABLE, slips=slips, left_out=left_out)
 
 
 def _told(places: Sequence[Place], options: TableOptions) -> Labels:

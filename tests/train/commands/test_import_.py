@@ -47,7 +47,7 @@ def test_a_taxel_that_is_constant_in_the_whole_set_is_named(
         write_frames(tmp_path / "csv" / f"trial{seed}", touch.t, touch.frames)
     words = ["import", "csv", str(tmp_path / "csv"), "--frames", "--out"]
     assert main([*words, str(tmp_path / "out")]) == 0
-    assert "[0, 5]; `edge-classify export --dead 0,5`" in capsys.readouterr().err
+    assert "[0, 5]; `edge-classify export --dead 0,5`" in "".join(capsys.readouterr())
 
 
 def test_warnings_that_are_alike_are_counted(make_touch, tmp_path, capsys):

@@ -4,7 +4,6 @@ import pytest
 
 from tests.train.importers.test_csv import RATE, imported, put
 from train.__main__ import main
-from train.importers.labels import read_rows
 
 TRIAL = "t,p1\n0,1\n0.1,2\n"
 
@@ -122,17 +121,3 @@ def test_labels_stand_as_they_are_in_any_spreadsheets_form(folder):
     _, recordings = imported(folder, *RATE)
     assert recordings["1"].labels == {"object": "012"}
     assert recordings["2"].labels == {"object": "None", "softness": "1"}
-
-
-@pytest.mark.parametrize(
-    ("rows", "word"),
-    [
-        ("x,object\na,b\n", "column file"),
-        ("file,object\n,b\n", "line 2"),
-        ("file\na\na\n", "a has two rows"),
-    ],
-)
-def test_a_table_that_is_none_is_refused(tmp_path, rows, word, refusal):
-    path = put(tmp_path, {"labels.csv": rows}) / "labels.csv"
-    with pytest.raises(ValueError, match=word):
-        read_rows(path)
