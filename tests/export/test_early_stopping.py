@@ -354,7 +354,7 @@ def test_the_board_decides_as_the_trials_that_certified_its_rules_were(
         for task in model.info.tasks
     }
     _, _, courses = fitted.sequential.judged(np.array(vectors), truth)
-    error = model.info.stopping["category"].rules[0].error
+    error = max(of.rules[0].error for of in model.info.stopping.values())
     events = [decided(model, recording, error) for recording in recordings]
     for task, course in courses.items():
         at, wrong = course.under(fastest(model.info.stopping[task], error))
