@@ -8,7 +8,7 @@ import re
 import string
 from collections.abc import Iterable, Mapping, Sized
 from contextlib import ExitStack
-from math import ceil, inf, prod
+from math import inf
 from pathlib import Path
 
 import numpy as np
@@ -28,8 +28,6 @@ from edge.writing import write_whole
 from export.c_graph import CompiledGraph
 
 ROOMS = Path(__file__).parent / "c"
-RATE_HZ = 120.0
-"""Frames a second for which there is room."""
 CODE_BYTES = 28 * 1024
 """Of all rooms, with small tables and the arithmetic of doubles, by gcc 12 with -O2 for a
 Cortex-M0+."""
@@ -39,6 +37,8 @@ MOST_SUMMED = 128
 """Samples beyond which numpy sums up in halves."""
 ALONE = {*measures.ALONE.values(), ("contact", "area")} - {("skin", "stiffness")}
 """(zone, quantity) that need no sums of a zone."""
+TYPE_OF = {"palette": "uint8", "packed": "uint8"}
+"""The types of tables that are no types of C."""
 DOUBTS = ("novelty", "remoteness")
 FLAGS = ("out_of_range", *DOUBTS)
 """Outputs of the model that are of no task."""
@@ -127,9 +127,9 @@ class Source:
         self._info = model.info
         self._layout = model.info.layout
         self._types = feature_types(model.info.features)
-        self._frames = ceil(model.info.window_s * RATE_HZ) + 4
         windows_s = model.decision_points_s
         self._last = len(windows_s) if error is not None else 1
+        self._zones = Zones(self._layout, self._types).names
         self.values: dict[str, object] = {
             "early": error is not None,
             "windows_s": windows_s[-self._last :],
@@ -137,8 +137,8 @@ class Source:
         for owner, names in ((self._layout, OF_LAYOUT), (self._info, OF_INFO)):
             self.values |= {name: getattr(owner, name) or 0 for name in names}
         self.flash = CODE_BYTES
-        self.ram = 4096
-        self.work = 2500 * self._info.width
+        self.ram = 4096 + 8 * self._layout.alive.size
+        self.work = 0
         outputs = set(model.outputs) - set(() if doubts else DOUBTS)
         points = range(len(windows_s))[-self._last :]
         room = self._info.width + self._features()
@@ -165,56 +165,67 @@ class Source:
                 file.flush()
 
     def _features(self) -> int:
-        """The `ec_feature` of each feature, and the tables of the kernels, from which
-        some are computed; how many doubles they are measured in."""
-        rows = []
-        largest = 0
+        """The `ec_course` and the `ec_feature` of each feature, and the tables of the
+        kernels, from which some are computed; how many doubles summaries take."""
+        courses = []
+        summed = 0
         for feature, width in zip(self._types, self._info.widths, strict=True):
-            samples = feature.kernels or feature.samples or self._info.samples
-            count = width // samples
-            if feature.summary not in ("", "rate"):
-                count = width
-                largest = max(largest, count * samples)
+            samples = feature.samples or self._info.samples
+            sums_up = feature.summary not in ("", "rate")
+            count = width if sums_up else width // samples
+            if sums_up:
+                together = count if "relative" in feature.transforms else 1
+                summed = max(summed, samples * together)
             alone = (feature.zone, feature.quantity) in ALONE
             of_region = "REGION_" * (alone and feature.zone == "contact")
+            quantity = f"EC_Q_{of_region}{feature.quantity.upper()}"
+            zone = self._zones.index(feature.zone) if not alone else 0
+            measured = quantity.replace("JOINT_CHANGE", "JOINT_ANGLE")
+            courses.append((samples, count, measured, 0 if feature.kernels else zone))
+        rows = []
+        order = sorted({c for c, f in zip(courses, self._types, strict=True) if not f.kernels})
+        for feature, course in zip(self._types, courses, strict=True):
             row = [
                 transforms.floor_of(feature, self._layout),
-                samples,
-                count,
-                "EC_NO_ZONE" if alone else f"EC_{feature.zone.upper()}",
-                f"EC_Q_{of_region}{feature.quantity.upper()}",
+                order.index(course) if course in order else 0,
+                course[2].replace("JOINT_ANGLE", feature.quantity.upper()),
                 [f"EC_T_{kind.upper()}" for kind in feature.transforms],
                 f"EC_S_{feature.summary.upper()}",
             ]
             rows.append(row)
-        self.values["features"] = rows
+        sizes = [samples * count for samples, count, _, _ in order]
+        places = np.cumsum([0, *sizes])
+        self.values |= {
+            "features": rows,
+            "courses": [
+                [samples, count, place, zone, measured]
+                for (samples, count, measured, zone), place in zip(order, places, strict=False)
+            ],
+            "values_count": str(places[-1]),
+        }
         for name in ("taxel_kernels", "zone_kernels"):
             table = self._info.kernels.get(name, KernelTable((), ()))
             self.values[name] = kernel_fields(table)
-        return largest + (len(measures.QUANTITIES) + 4) * self._frames
+        return summed
 
     def _skin(self) -> None:
         """The skin, and what is measured in every frame."""
         layout = self._layout
         quantities = {feature.quantity for feature in self._types}
-        zones = Zones(layout, self._types).names
         cells = Cells(layout)
         kernel_cells = Cells(layout, KERNEL_CELLS)
         pooled = cells.count * ("taxel_force" in quantities)
         pooled_for_kernels = kernel_cells.count * ("taxel_kernels" in quantities)
-        spreads = not quantities.isdisjoint(measures.QUANTITIES[6:])
-        row = 72 + 64 * max(len(zones), 1) + 8 * self._info.joints
-        row += 4 * (pooled + pooled_for_kernels)
-        self.ram += self._frames * row + 8 * layout.alive.size
-        self.work += (12000 if spreads else 4000) * self._frames * len(zones)
+        zone_channels = 8 * len(self._zones) * ("zone_kernels" in quantities)
         self.values |= {
-            "frames": self._frames,
             "cells": pooled,
             "kernel_cells": pooled_for_kernels,
+            "zone_channels": zone_channels,
+            "channels": zone_channels + pooled_for_kernels,
             "motion": "motion" in quantities,
-            "spreads": spreads,
+            "centroids": not quantities.isdisjoint(("along", "around")),
             "force_motion": not quantities.isdisjoint(("force_motion", "stiffness")),
-            "zone_names": [f"EC_{name.upper()}" for name in (*zones, "no_zone")],
+            "zone_names": [f"EC_{name.upper()}" for name in (*self._zones, "no_zone")],
             "cell_of_taxel": _of_taxels(layout, cells),
             "kernel_cell_of_taxel": _of_taxels(layout, kernel_cells),
         }
@@ -245,21 +256,26 @@ class Source:
         """The steps and the tables of the graph."""
         tables = []
         for table in graph.tables:
-            kind = table.dtype.name
-            values = array(f"{kind}_t", table.reshape(-1))
-            stride = (table.ndim - 1) * table.shape[-1]
-            tables.append([values, stride, f"EC_{kind.upper()}"])
+            kind = TYPE_OF.get(table.type, table.type)
+            values = array(f"{kind}_t", table.data.reshape(-1))
+            palette = array("double", table.palette) if table.palette.size else 0
+            stride = (table.data.ndim - 1) * table.data.shape[-1]
+            code = f"EC_{table.type.upper()}"
+            tables.append([values, palette, stride, table.columns, code, table.shift])
             self.flash += table.nbytes
+        steps = []
         for step in graph.steps:
-            is_product = step.operator in ("EC_GEMM", "EC_MATMUL")
-            self.work += 16 * prod(step.sizes) if is_product else 400 * max(step.sizes)
-        self.flash += 40 * len(graph.steps)
+            inputs = [*step.inputs, *[0] * (5 - len(step.inputs))]
+            outputs = [*step.outputs, *[0] * (3 - len(step.outputs))]
+            steps.append([inputs, outputs, step.sizes, step.operator])
+        self.flash += 26 * len(graph.steps)
         self.ram += 8 * graph.arena
         self.values |= {
             "arena": graph.arena,
             "ram": self.ram,
             "tables": tables,
-            "steps": graph.steps,
+            "steps": steps,
+            "most_columns": max((table.columns for table in graph.tables), default=0),
         }
 
     def _tasks(

@@ -28,6 +28,10 @@ int main(void) {
     int count = ec_push(counts, NULL, t_s, NULL, events);
     if (count < 0) fprintf(stderr, "the frame at %.3f s is refused: %d\n", t_s, count);
     for (int i = 0; i < count; i++) print(&events[i]);
+    while (ec_is_due()) {
+      count = ec_work(events);
+      for (int i = 0; i < count; i++) print(&events[i]);
+    }
   }
   return 0;
 }

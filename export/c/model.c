@@ -8,6 +8,7 @@ const ec_link ec_links[] = $links;
 const uint8_t ec_zone_names[] = $zone_names;
 const int16_t ec_cell_of_taxel[] = $cell_of_taxel;
 const int16_t ec_kernel_cell_of_taxel[] = $kernel_cell_of_taxel;
+const ec_course ec_courses[] = $courses;
 const ec_feature ec_features[] = $features;
 const ec_kernels ec_taxel_kernels = $taxel_kernels;
 const ec_kernels ec_zone_kernels = $zone_kernels;
