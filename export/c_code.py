@@ -31,6 +31,8 @@ ROOMS = Path(__file__).parent / "c"
 CODE_BYTES = 28 * 1024
 """Of all rooms, with small tables and the arithmetic of doubles, by gcc 12 with -O2 for a
 Cortex-M0+."""
+REST_OF_RAM = 2048 + 2560
+"""Of the stack, and of what does not depend on the model."""
 LARGEST = 2**63
 """No product of a frame's sums may reach it."""
 MOST_SUMMED = 128
@@ -137,7 +139,7 @@ class Source:
         for owner, names in ((self._layout, OF_LAYOUT), (self._info, OF_INFO)):
             self.values |= {name: getattr(owner, name) or 0 for name in names}
         self.flash = CODE_BYTES
-        self.ram = 4096 + 8 * self._layout.alive.size
+        self.ram = 0
         self.work = 0
         outputs = set(model.outputs) - set(() if doubts else DOUBTS)
         points = range(len(windows_s))[-self._last :]
@@ -203,6 +205,7 @@ class Source:
             ],
             "values_count": str(places[-1]),
         }
+        self.ram += self._last * 8 * int(places[-1])
         for name in ("taxel_kernels", "zone_kernels"):
             table = self._info.kernels.get(name, KernelTable((), ()))
             self.values[name] = kernel_fields(table)
@@ -217,6 +220,12 @@ class Source:
         pooled = cells.count * ("taxel_force" in quantities)
         pooled_for_kernels = kernel_cells.count * ("taxel_kernels" in quantities)
         zone_channels = 8 * len(self._zones) * ("zone_kernels" in quantities)
+        zones = max(len(self._zones), 1)
+        unsure = 2 * len(self._zones) + 3 + self._info.joints
+        row = 40 + 8 * max(self._info.joints, 1) + 121 * zones + 8 * unsure
+        row += 4 * max(pooled, 1) + 4 * max(pooled_for_kernels, 1)
+        self.ram += 4 * row + 48 * unsure + 7 * layout.alive.size
+        self.ram += self._last * 240 * (zone_channels + pooled_for_kernels)
         self.values |= {
             "cells": pooled,
             "kernel_cells": pooled_for_kernels,
@@ -224,10 +233,13 @@ class Source:
             "channels": zone_channels + pooled_for_kernels,
             "motion": "motion" in quantities,
             "centroids": not quantities.isdisjoint(("along", "around")),
+            "spreads": not quantities.isdisjoint(measures.QUANTITIES[6:]),
             "force_motion": not quantities.isdisjoint(("force_motion", "stiffness")),
             "zone_names": [f"EC_{name.upper()}" for name in (*self._zones, "no_zone")],
-            "cell_of_taxel": _of_taxels(layout, cells),
-            "kernel_cell_of_taxel": _of_taxels(layout, kernel_cells),
+            "cell_of_taxel": _of_taxels(layout, cells) if pooled else (),
+            "kernel_cell_of_taxel": (
+                _of_taxels(layout, kernel_cells) if pooled_for_kernels else ()
+            ),
         }
 
     def _geometry(self) -> None:
@@ -268,14 +280,15 @@ class Source:
             inputs = [*step.inputs, *[0] * (5 - len(step.inputs))]
             outputs = [*step.outputs, *[0] * (3 - len(step.outputs))]
             steps.append([inputs, outputs, step.sizes, step.operator])
+        most_columns = max((table.columns for table in graph.tables), default=0)
         self.flash += 26 * len(graph.steps)
-        self.ram += 8 * graph.arena
+        self.ram += 8 * (graph.arena + most_columns) + REST_OF_RAM
         self.values |= {
             "arena": graph.arena,
             "ram": self.ram,
             "tables": tables,
             "steps": steps,
-            "most_columns": max((table.columns for table in graph.tables), default=0),
+            "most_columns": most_columns,
         }
 
     def _tasks(

@@ -23,8 +23,10 @@ PACKED_BITS = 25
 MOST_SHIFT = 40
 READ_AHEAD = 3
 """Bytes that are read behind a packed number."""
-MATRICES = {"Project": 3, "MatMul": 1, "Gemm": 1}
-"""{operator: which of its inputs is a matrix}."""
+MATRICES = (("Project", 3), ("MatMul", 1), ("Gemm", 1))
+"""Operators and which of their inputs is a matrix."""
+COLUMNS = ("Project", 4)
+"""The input that tells which features are projected."""
 CHAIN = "Clip Round Mul Sub".split()
 """How features become steps of a projection, backwards."""
 ELEMENT_WISE = "Add Sub Mul Div Max LessOrEqual Where Clip Round Sqrt Squeeze".split()
@@ -263,8 +265,7 @@ class CompiledGraph:
         operator = node.operator
         if operator == "Where" and len(names) == 1:
             operator = "Squeeze"
-        matrix = MATRICES.get(operator, -1)
-        inputs = [self._operand(name, i == matrix) for i, name in enumerate(names)]
+        inputs = [self._operand(name, (operator, i)) for i, name in enumerate(names)]
         outputs = [self.places[name] for name in node.outputs]
         sizes = self._sizes(node, operator)
         return Step(f"EC_{operator.upper()}", inputs, outputs, sizes)
@@ -302,12 +303,15 @@ class CompiledGraph:
         behind = prod(shape[axis + 1 :])
         return [before, shape[axis], behind, size // (before * behind)]
 
-    def _operand(self, name: str, is_matrix: bool) -> int:
-        """The place of a value, or the number of its table."""
+    def _operand(self, name: str, use: tuple[str, int]) -> int:
+        """The place of a value, or the number of its table, for an input of an
+        operator."""
         if name in self._variable or not name:
             return self.places[name]
         values = self._constants(name)
-        table = packed(values) if is_matrix else None
+        if use == COLUMNS:
+            return self._number(Table("int16", values[0].astype(np.uint16).astype("i2")))
+        table = packed(values) if use in MATRICES else None
         if table is None:
             values = values.reshape(len(values), -1)
             table = as_table(values[0] if (values == values[0]).all() else values)

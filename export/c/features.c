@@ -190,7 +190,8 @@ bool ec_vector_slice(uint32_t point) {
   uint32_t rows = DILATIONS * KERNELS;
   uint32_t step = 1;
   bool is_of_zones = feature->quantity == EC_Q_ZONE_KERNELS;
-  if (is_of_zones || feature->quantity == EC_Q_TAXEL_KERNELS) {
+  bool is_of_taxels = feature->quantity == EC_Q_TAXEL_KERNELS;
+  if (EC_CHANNELS && (is_of_zones || is_of_taxels)) {
     const ec_kernels *kernels = is_of_zones ? &ec_zone_kernels : &ec_taxel_kernels;
     if (now.row == 0) begin_kernels(kernels);
     convolve(kernels, point);

@@ -2,6 +2,8 @@
    decides is made of whole numbers below 2^53, so that the order of sums changes no bit. */
 #include "internal.h"
 
+#define TWO_53 9007199254740992.0
+
 double ec_arena[EC_ARENA];
 
 static struct {
@@ -58,86 +60,90 @@ static void element_wise(const ec_step *step) {
   }
 }
 
-/* The sums of a packed matrix's columns, row by row. */
+/* The sums of a packed matrix's columns, row by row. Below 2^53 they do not depend on the order; those
+   of a vector that is refused may wrap around. */
 static struct {
   const uint8_t *row;
-  bool is_whole; /* all factors are whole numbers of 32 bits */
-  int64_t sums[EC_AT_LEAST_1(EC_MOST_COLUMNS)];
-  int64_t squares;
+  uint64_t sums[EC_AT_LEAST_1(EC_MOST_COLUMNS)];
+  uint64_t squares;
   double excess;
+  int bits; /* behind the point, of a factor */
 } product;
 
 static void begin_product(const ec_table *matrix) {
   product.row = (const uint8_t *)matrix->data + now.point * matrix->stride;
-  product.is_whole = true;
   product.squares = 0;
   product.excess = 0.0;
+  product.bits = 0;
   for (uint32_t j = 0; j < matrix->columns; j++) product.sums[j] = 0;
 }
 
 /* A number of at most 25 bits that begins at a bit. */
-static int32_t unpacked(const uint8_t *row, uint32_t bit, uint32_t bits) {
+static inline int32_t unpacked(const uint8_t *row, uint32_t bit, uint32_t bits) {
   const uint8_t *p = row + bit / 8;
   uint32_t word = p[0] | (uint32_t)p[1] << 8 | (uint32_t)p[2] << 16 | (uint32_t)p[3] << 24;
-  uint32_t mask = ((uint32_t)1 << bits) - 1;
-  return (int32_t)(word >> bit % 8 & mask) - ((int32_t)1 << (bits - 1));
+  word = word >> bit % 8 & (((uint32_t)1 << bits) - 1);
+  return (int32_t)(word - ((uint32_t)1 << (bits - 1)));
+}
+
+/* A whole number; 0 for one that is not finite, of a vector that is refused. */
+static int64_t whole(double x) { return x > -TWO_53 && x < TWO_53 ? (int64_t)x : 0; }
+
+/* Most factors have 32 bits, of which many processors multiply two in one instruction. */
+static void multiply_small(int32_t factor, const uint8_t *row, uint32_t bits, uint32_t size) {
+  uint64_t *sum = product.sums;
+  for (uint32_t bit = 0; bit < size; bit += bits, sum++) {
+    *sum += (uint64_t)((int64_t)factor * unpacked(row, bit, bits));
+  }
+}
+
+static void multiply_large(int64_t factor, const uint8_t *row, uint32_t bits, uint32_t size) {
+  uint64_t *sum = product.sums;
+  for (uint32_t bit = 0; bit < size; bit += bits, sum++) {
+    *sum += (uint64_t)factor * (uint64_t)(int64_t)unpacked(row, bit, bits);
+  }
 }
 
 /* Add the products of a factor and the next row; a row of 0 bits is one of zeros. */
-static void multiply(int32_t factor, uint32_t columns) {
-  uint32_t bits = *product.row++;
-  if (factor != 0) {
-    for (uint32_t j = 0; bits && j < columns; j++) {
-      product.sums[j] += (int64_t)factor * unpacked(product.row, j * bits, bits);
-    }
+static void multiply(int64_t factor, uint32_t columns) {
+  const uint8_t *row = product.row + 1;
+  uint32_t bits = *product.row;
+  uint32_t size = columns * bits;
+  product.row = row + (size + 7) / 8;
+  if (factor > INT32_MIN && factor < INT32_MAX) {
+    if (factor != 0) multiply_small((int32_t)factor, row, bits, size);
+  } else {
+    multiply_large(factor, row, bits, size);
   }
-  product.row += (columns * bits + 7) / 8;
-}
-
-/* The same of a factor that is no such number. */
-static void multiply_real(double factor, const ec_table *matrix, double *out) {
-  uint32_t bits = *product.row++;
-  double unit = ec_exp2(-matrix->shift);
-  for (uint32_t j = 0; bits && j < matrix->columns; j++) {
-    out[j] += factor * (unit * unpacked(product.row, j * bits, bits));
-  }
-  product.row += (matrix->columns * bits + 7) / 8;
-}
-
-static bool are_whole(uint32_t x, uint32_t n) {
-  for (uint32_t i = 0; i < n; i++) {
-    double factor = at(x, i);
-    if (!(factor > -2147483648.0 && factor < 2147483648.0)) return false;
-    if ((int32_t)factor != factor) return false;
-  }
-  return true;
 }
 
 static void end_product(const ec_table *matrix, const ec_step *step) {
   double *out = ec_arena + step->outputs[0];
-  double unit = ec_exp2(-matrix->shift);
-  for (uint32_t j = 0; product.is_whole && j < step->sizes[COUNT]; j++) {
-    out[j] = j < matrix->columns ? (double)product.sums[j] * unit : 0.0;
+  double unit = ec_exp2(-matrix->shift - product.bits);
+  for (uint32_t j = 0; j < step->sizes[COUNT]; j++) {
+    out[j] = j < matrix->columns ? (double)(int64_t)product.sums[j] * unit : 0.0;
   }
 }
+
+/* Squared weights of coordinates, which are powers of two, have no more: BESIDE in
+   train/model/novelty.py. */
+#define FRACTION_BITS 8
 
 /* x (n) times a packed matrix (n, m), plus m numbers of a Gemm. */
 static void packed_product(const ec_step *step) {
   const ec_table *matrix = &ec_tables[step->inputs[1] - EC_ARENA];
-  uint32_t n = step->sizes[ALONG];
   double *out = ec_arena + step->outputs[0];
+  uint32_t n = step->sizes[ALONG];
   if (now.begin == 0) {
     begin_product(matrix);
-    product.is_whole = are_whole(step->inputs[0], n);
-    for (uint32_t j = 0; j < step->sizes[COUNT]; j++) out[j] = 0.0;
+    for (uint32_t i = 0; i < n; i++) {
+      double x = at(step->inputs[0], i);
+      if (x != ec_rint(x)) product.bits = FRACTION_BITS;
+    }
   }
   for (uint32_t i = now.begin; i < now.end; i++) {
-    double x = at(step->inputs[0], i);
-    if (product.is_whole) {
-      multiply((int32_t)x, matrix->columns);
-    } else {
-      multiply_real(x, matrix, out);
-    }
+    double x = at(step->inputs[0], i) * ec_exp2(product.bits);
+    multiply(whole(x), matrix->columns);
   }
   if (now.end < n) return;
   end_product(matrix, step);
@@ -153,17 +159,18 @@ enum { MEANS, GAINS, LIMIT, MATRIX, COLUMNS };
 static void project(const ec_step *step) {
   const uint16_t *inputs = step->inputs;
   const ec_table *matrix = &ec_tables[inputs[MATRIX] - EC_ARENA];
+  const uint16_t *columns = 0;
   double limit = at(inputs[LIMIT], 0);
+  if (inputs[COLUMNS] != EC_NOWHERE) columns = ec_tables[inputs[COLUMNS] - EC_ARENA].data;
   if (now.begin == 0) begin_product(matrix);
   for (uint32_t i = now.begin; i < now.end; i++) {
-    uint32_t feature = inputs[COLUMNS] == EC_NOWHERE ? i : (uint32_t)at(inputs[COLUMNS], i);
+    uint32_t feature = columns ? columns[i] : i;
     double x = (ec_arena[feature] - at(inputs[MEANS], feature)) * at(inputs[GAINS], i);
     double rounded = ec_rint(x);
     double inside = rounded < -limit ? -limit : rounded > limit ? limit : rounded;
-    double excess = rounded - inside;
-    product.excess += excess < 0.0 ? -excess : excess;
-    int32_t factor = inside == inside ? (int32_t)inside : 0;
-    product.squares += (int64_t)factor * factor;
+    if (inside != rounded) product.excess += rounded < 0.0 ? inside - rounded : rounded - inside;
+    int32_t factor = inside == inside ? (int32_t)inside : 0; /* no limit is beyond 2^24 */
+    product.squares += (uint64_t)((int64_t)factor * factor);
     multiply(factor, matrix->columns);
   }
   if (now.end < step->sizes[ALONG]) return;

@@ -36,6 +36,8 @@ double ec_frexp(double x, int *power); /* x above 0 is a fraction from 0.5 to 1 
 typedef bool ec_set[EC_ROWS * EC_COLS];
 
 typedef struct {
+  uint32_t begin; /* of the active taxels, and the end of them */
+  uint32_t end;
   uint32_t area;
   uint16_t peak;
   ec_set taxels;

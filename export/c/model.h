@@ -30,6 +30,7 @@
 #define EC_MOTION $motion
 #define EC_FORCE_MOTION $force_motion
 #define EC_CENTROIDS $centroids
+#define EC_SPREADS $spreads
 #define EC_COURSES $courses_count
 #define EC_VALUES $values_count
 #define EC_ZONE_CHANNELS $zone_channels

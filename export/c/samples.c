@@ -62,6 +62,7 @@ static double sure_value(const ec_course *course, uint32_t index, ec_row *row) {
     case EC_Q_AREA: return area;
     case EC_Q_PRESSURE: return (double)zone[2] / ((area > 1.0 ? area : 1.0) * EC_SCALE);
     default:
+      if (!EC_SPREADS) return 0.0;
       if (!row->is_spread[course->zone]) spread(zone, row->spreads[course->zone]);
       row->is_spread[course->zone] = true;
       return row->spreads[course->zone][course->quantity - EC_Q_SPREAD_ALONG];

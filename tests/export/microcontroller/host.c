@@ -6,7 +6,7 @@
 #include "internal.h"
 
 /* Behind the last one, the slices of a decision for each frame are added. */
-enum { VECTOR, VECTORS_OF_RECORDING, BASELINE, EVENTS_OF_RECORDING };
+enum { VECTOR, VECTORS_OF_RECORDING, BASELINE, COSTS, EVENTS_OF_RECORDING };
 
 typedef struct {
   double t;
@@ -133,6 +133,45 @@ static void follow(uint32_t frames) {
   }
 }
 
+#if defined(__arm__)
+/* With -icount shift=0 QEMU takes a nanosecond for an instruction; the timer of its boards counts down
+   at 25 MHz. */
+#define TIMER ((volatile uint32_t *)0xE000E010u) /* SysTick's registers */
+#define INSTRUCTIONS_OF_TICK 40.0
+static void start_timer(void) {
+  TIMER[1] = 0xFFFFFFu;
+  TIMER[2] = 0;
+  TIMER[0] = 5;
+}
+static uint32_t ticks(void) { return 0xFFFFFFu - TIMER[2]; }
+#else
+#define INSTRUCTIONS_OF_TICK 0.0
+static void start_timer(void) {}
+static uint32_t ticks(void) { return 0; }
+#endif
+
+/* The instructions of the longest ec_push, of all frames, of the longest slice, and of all slices. */
+static void measure(uint32_t frames) {
+  double costs[4] = {0.0};
+  ec_event events[EC_MOST_EVENTS];
+  start_timer();
+  ec_begin();
+  for (uint32_t i = 0; i < frames; i++) {
+    frame next = next_frame();
+    uint32_t begin = ticks();
+    ec_push(next.counts, next.valid, next.t, next.has_joints ? next.joints : 0, events);
+    for (uint32_t part = 0; part == 0 || ec_is_due(); part += 2) {
+      if (part) ec_work(events);
+      uint32_t end = ticks();
+      double spent = INSTRUCTIONS_OF_TICK * ((end - begin) & 0xFFFFFFu);
+      if (spent > costs[part ? 2 : 0]) costs[part ? 2 : 0] = spent;
+      costs[part ? 3 : 1] += spent;
+      begin = ticks();
+    }
+  }
+  give(costs, 4);
+}
+
 int main(void) {
   uint32_t question[2];
   input = fopen("input.bin", "rb");
@@ -148,6 +187,8 @@ int main(void) {
       give_vectors(question[1]);
     } else if (question[0] == BASELINE) {
       follow(question[1]);
+    } else if (question[0] == COSTS) {
+      measure(question[1]);
     } else {
       classify(question[1], question[0] - EVENTS_OF_RECORDING);
     }

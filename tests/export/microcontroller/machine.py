@@ -11,7 +11,7 @@ from edge.classifier import Classifier, suited
 from edge.events import Decided, Onset, Release
 
 HERE = Path(__file__).parent
-VECTOR, VECTORS_OF_RECORDING, BASELINE, EVENTS_OF_RECORDING = range(4)
+VECTOR, VECTORS_OF_RECORDING, BASELINE, COSTS, EVENTS_OF_RECORDING = range(5)
 WARNINGS = "-Wall -Wextra -Werror -Wconversion -Wdouble-promotion -pedantic"
 COMMON = f"-std=c99 -O2 -ffp-contract=off {WARNINGS}".split()
 SANITIZED = "-fsanitize=undefined,address -fno-sanitize-recover=all".split()
