@@ -8,10 +8,8 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
-import numpy as np
-
 from edge.answers import answers_about
-from edge.events import Aside, Decided, Event, Onset, Release
+from edge.events import Decided, Event, Onset, Release
 from edge.model.model import Model
 from edge.touch.contact import Contact
 from edge.touch.frame import Frame
@@ -23,7 +21,6 @@ if TYPE_CHECKING:
     from edge.recording import Recording
     from edge.skin.loop import JointSource
     from edge.skin.skin import Skin
-    from edge.touch.still import WatchfulTracker
 
 ASKED_A_SECOND = 200.0
 """Questions to the model about several contacts. Each takes one to two milliseconds on
@@ -49,23 +46,6 @@ class Pending:
     decision_point: int
     tasks: list[str]
     decided: dict[str, Decided] = field(default_factory=dict)
-
-
-class AsideEvents:
-    """Names the taxels that are set aside, whenever they change."""
-
-    def __init__(self, tracker: WatchfulTracker) -> None:
-        self._tracker = tracker
-        self._named = tracker.aside
-        """(rows, cols) the taxels that the last event named."""
-
-    def at(self, t: float) -> list[Event]:
-        """The event, if there is one, after a frame at a time."""
-        aside = self._tracker.aside
-        if (aside == self._named).all():
-            return []
-        self._named = aside
-        return [Aside(t, tuple((row, col) for row, col in np.argwhere(aside).tolist()))]
 
 
 class Classifier:
@@ -151,13 +131,12 @@ class Classifier:
             max_contacts=max_contacts,
             motion_on_skin=motion_on_skin,
         )
-        self.layout = self.tracker.tracker.layout
+        self.layout = self.tracker.layout
         self._pending: list[Pending] = []
         self._numbers: dict[Contact, int | None] = {}
         """The numbers of the contacts under way; None if one is followed."""
         self._begun = 0
         self._end_s: float | None = None
-        self._aside = AsideEvents(self.tracker)
         self._untouched: Untouched | None = None
         if any(task.no_contact is not None for task in model.info.tasks.values()):
             from edge.no_contact import Untouched  # few models know no contact
@@ -176,7 +155,7 @@ class Classifier:
         if self._untouched is not None and self._begun == 0:
             self._untouched.push(frame)
         contacts = self.tracker.push(frame)
-        events = self._aside.at(frame.t) + self._follow(contacts, frame.t)
+        events = self._follow(contacts, frame.t)
         return events + self._decide_due(frame.t, began, most)
 
     def _most_asked(self, t: float) -> float:
@@ -236,11 +215,8 @@ class Classifier:
         events: list[Event] = []
         if self._end_s is None:
             return events
-        if self._begun == 0:
-            contacts = self.tracker.finish()
-            if self._untouched is not None and not contacts:
-                events += self._untouched.decisions(self._end_s, began)
-            events += self._follow(contacts, self._end_s)
+        if self._untouched is not None and self._begun == 0:
+            events += self._untouched.decisions(self._end_s, began)
         events += self._decide_due(self._end_s, began, math.inf)
         for pending in self._pending:
             pending.decision_point = self._last

@@ -9,9 +9,6 @@ from typing import Any, Self
 from edge.flags import in_order
 from edge.model.model import Decision
 
-MOST_PLACES = 6
-"""Taxels that a line for a person names."""
-
 
 @dataclass(frozen=True)
 class Onset:
@@ -132,30 +129,7 @@ class Release:
         return {**_line("release", self), "release_s": round(self.release_s, 6)}
 
 
-@dataclass(frozen=True)
-class Aside:
-    """Taxels are above the threshold without a touch, and are not followed.
-
-    >>> import edge
-    >>> from edge.events import Aside
-    >>> Aside(2.5, ((3, 5),)).to_dict()
-    {'event': 'aside', 't': 2.5, 'taxels': [[3, 5]]}
-
-    Attributes:
-        t: when this was certain.
-        taxels: (row, column) of each; empty once all are followed again.
-    """
-
-    t: float
-    taxels: tuple[tuple[int, int], ...]
-
-    def to_dict(self) -> dict[str, Any]:
-        """The event as a JSON object."""
-        taxels = list(map(list, self.taxels))
-        return {"event": "aside", "t": round(self.t, 6), "taxels": taxels}
-
-
-Event = Aside | Onset | Decided | Release
+Event = Onset | Decided | Release
 
 
 def _line(name: str, event: Onset | Decided | Release) -> dict[str, Any]:

@@ -185,7 +185,9 @@ class Source:
             measured = quantity.replace("JOINT_CHANGE", "JOINT_ANGLE")
             courses.append((samples, count, measured, 0 if feature.kernels else zone))
         rows = []
-        order = sorted({c for c, f in zip(courses, self._types, strict=True) if not f.kernels})
+        order = sorted(
+            {c for c, f in zip(courses, self._types, strict=True) if not f.kernels}
+        )
         for feature, course in zip(self._types, courses, strict=True):
             row = [
                 transforms.floor_of(feature, self._layout),
@@ -201,7 +203,9 @@ class Source:
             "features": rows,
             "courses": [
                 [samples, count, place, zone, measured]
-                for (samples, count, measured, zone), place in zip(order, places, strict=False)
+                for (samples, count, measured, zone), place in zip(
+                    order, places, strict=False
+                )
             ],
             "values_count": str(places[-1]),
         }

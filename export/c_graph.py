@@ -33,6 +33,8 @@ ELEMENT_WISE = "Add Sub Mul Div Max LessOrEqual Where Clip Round Sqrt Squeeze".s
 TYPES = "int8 int16 int32 float32 float64".split()
 """Of tables, from the smallest."""
 
+NO_PALETTE = np.zeros(0)
+
 
 class Table(NamedTuple):
     """Numbers; see `ec_table` in `export/c/internal.h`.
@@ -47,12 +49,13 @@ class Table(NamedTuple):
 
     type: str
     data: Array
-    palette: Floats = np.array([])
+    palette: Floats = NO_PALETTE
     columns: int = 0
     shift: int = 0
 
     @property
     def nbytes(self) -> int:
+        """Of its numbers."""
         return self.data.nbytes + self.palette.nbytes
 
 
@@ -160,7 +163,7 @@ class CompiledGraph:
                     elif user.operator == "Sub" and user.inputs[0] in rounded.outputs:
                         sides[0] = users[user.outputs[0]][0].outputs[0]
                 taken.add(steps)
-                columns = self._columns(centred.inputs[0])
+                columns = self._columns(centred.inputs[0]) or ""
                 means = self._means(centred.inputs[1], columns)
                 names = [means, gained.inputs[1], clip.inputs[2], node.inputs[1]]
                 names.append(columns)
@@ -174,21 +177,23 @@ class CompiledGraph:
         chain = []
         name = node.inputs[0]
         for operator in CHAIN:
-            maker = self._makers.get(name)
-            if maker is None or maker.operator != operator:
-                return []
-            if not self._variable.isdisjoint(maker.inputs[1:]):
+            maker = self._maker(name, operator)
+            if maker is None or not self._variable.isdisjoint(maker.inputs[1:]):
                 return []
             chain.append(maker)
             name = maker.inputs[0]
         is_packed = packed(self._constants(node.inputs[1])) is not None
         return chain if is_packed and self._columns(name) is not None else []
 
+    def _maker(self, name: str, operator: str) -> Node | None:
+        """What makes a value, if it is of an operator."""
+        maker = self._makers.get(name)
+        return maker if maker is not None and maker.operator == operator else None
+
     def _is_guard(self, name: str) -> bool:
         """Whether a value is of all features times 0."""
-        maker = self._makers.get(name)
-        is_product = maker is not None and maker.operator == "Mul"
-        if not is_product or maker.inputs[0] != "features":
+        maker = self._maker(name, "Mul")
+        if maker is None or maker.inputs[0] != "features":
             return False
         return not self._constants(maker.inputs[1]).any()
 
@@ -196,10 +201,10 @@ class CompiledGraph:
         """The name of the places of gathered features, empty of all; or None."""
         if name == "features":
             return ""
-        maker = self._makers.get(name)
-        gathers = maker is not None and maker.operator == "Gather"
-        is_of_features = gathers and maker.inputs[0] == "features"
-        return maker.inputs[1] if is_of_features else None
+        maker = self._maker(name, "Gather")
+        if maker is None or maker.inputs[0] != "features":
+            return None
+        return maker.inputs[1]
 
     def _means(self, name: str, columns: str) -> str:
         """The name of means by feature, among them those of some columns. Tasks share
@@ -310,7 +315,9 @@ class CompiledGraph:
             return self.places[name]
         values = self._constants(name)
         if use == COLUMNS:
-            return self._number(Table("int16", values[0].astype(np.uint16).astype("i2")))
+            return self._number(
+                Table("int16", values[0].astype(np.uint16).astype("i2"))
+            )
         table = packed(values) if use in MATRICES else None
         if table is None:
             values = values.reshape(len(values), -1)
@@ -319,7 +326,11 @@ class CompiledGraph:
 
     def _number(self, table: Table) -> int:
         """The number of a table, behind the arena; equal ones are stored once."""
-        key = table.type, table.data.shape, table.data.tobytes() + table.palette.tobytes()
+        key = (
+            table.type,
+            table.data.shape,
+            table.data.tobytes() + table.palette.tobytes(),
+        )
         if key not in self._numbers:
             self._numbers[key] = len(self.tables)
             self.tables.append(table)
@@ -356,7 +367,9 @@ def packed(matrices: Floats) -> Table | None:
     rows = [b"".join(map(packed_row, matrix)) for matrix in whole]
     size = max(map(len, rows)) + READ_AHEAD
     data = np.array([[*row.ljust(size, b"\0")] for row in rows], np.uint8)
-    return Table("packed", data[0] if len(rows) == 1 else data, columns=columns, shift=shift)
+    return Table(
+        "packed", data[0] if len(rows) == 1 else data, columns=columns, shift=shift
+    )
 
 
 def packed_row(row: Integers) -> bytes:

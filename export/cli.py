@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import os
+import re
 import sys
 from collections.abc import Sequence
 from functools import partial
@@ -43,7 +44,7 @@ FIXED = ("features", "projection", "scaling", "components", "k", "window", "task
 """Options that would make another model than the one that a point was measured with."""
 FORWARDED = (
     "features projection scaling components k tasks leave_out threshold onset "
-    "release jobs"
+    "release dead jobs"
 ).split()
 """Options that `fit` takes as they are."""
 DECISION_POINTS = "0.2:1.2:0.1"
@@ -53,6 +54,22 @@ count = within(int, 1, 1_000_000)
 counts = within(int, 0, 65534)
 seconds = within(float, 0.01, LONGEST_S)
 """The types of options that take a number of things, counts of a taxel, or seconds."""
+
+
+def taxel(text: str) -> tuple[int, int]:
+    """The row and column of a taxel.
+
+    Raises:
+        ArgumentTypeError: the text is no taxel.
+    """
+    place = re.fullmatch(r"([0-9]{1,4}),([0-9]{1,4})", text)
+    if place is None:
+        raise argparse.ArgumentTypeError(
+            f"must be ROW,COL, such as 3,5, not {text[:40]!r}"
+        )
+    return int(place[1]), int(place[2])
+
+
 OPTIONS: dict[str, dict[str, Any]] = {
     # The recordings, the model and its tasks, and the settings that can be held fixed.
     "--data": {
@@ -134,6 +151,13 @@ OPTIONS: dict[str, dict[str, Any]] = {
         "type": seconds,
         "help": "seconds that a contact may be away and go on (default: the skin's, or longer "
         "if many touches are felt in pieces and that is much more accurate)",
+    },
+    "--dead": {
+        "nargs": "+",
+        "type": taxel,
+        "default": (),
+        "metavar": "ROW,COL",
+        "help": "taxels that are left out, counted from 0, as they are broken",
     },
     # The point of `make tradeoff`, the arm, and the files that are written or scored.
     "--front": {

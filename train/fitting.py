@@ -17,6 +17,7 @@ from train.choose.decision_points import decision_points, has_early_points
 from train.choose.options import FitOptions, Loaded, trials_of
 from train.choose.settings import Chosen, Settings
 from train.choose.windows import windows_of
+from train.data.broken import BrokenTaxels
 from train.data.dataset import DataSet, read
 from train.data.groups import TRIAL, are_drawn
 from train.data.leaks import leaks, without_copies
@@ -113,6 +114,7 @@ def fit(data: DataSet | str | Path | Sequence[str | Path], **options: Any) -> Fi
         release: seconds that a contact may be away and go on. Where None they are the
             skin's, or more where that is more accurate (`train.data.pieces.joined`).
         arm: for recordings with joint angles that name no arm.
+        dead: (row, col) of taxels that are left out.
         quick: fewer candidates and folds.
         jobs: processes; all cores where None.
         progress: show progress bars on stderr.
@@ -179,6 +181,10 @@ def load(
         seconds = [float(r.t[-1] - r.t[0]) for r in recordings.recordings]
         windows = windows_of(seconds)
     loaded = trials_of(recordings, windows, options)
+    taxels = BrokenTaxels()
+    for recording in recordings.recordings:
+        taxels.add(recording)
+    notes += taxels.notes(loaded.dataset.layout)
     return replace(loaded, notes=[*notes, *loaded.notes])
 
 

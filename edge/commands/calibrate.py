@@ -7,6 +7,7 @@ touched, or has taxels that cannot be read or are saturated, is refused.
 
 import argparse
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -16,6 +17,7 @@ from edge.arrays import Booleans, Counts, Floats, Integers
 from edge.commands.options import add_skin, within
 from edge.commands.output import LOG, Output, counted
 from edge.commands.source import open_skin
+from edge.commands.texts import places_text
 from edge.errors import InputError
 from edge.skin.calibration import deaf_taxels, places, save_calibration
 from edge.skin.file import SkinFile, TaxelCalibration, load
@@ -33,6 +35,7 @@ FEWEST_TOGETHER = 2
 SPREADS = 6.0
 """Without a former calibration, a taxel stands out from the others of its kind by the
 onset and so many median deviations from their median."""
+BROKEN = "list broken taxels under dead in [signal]"
 MIN_SHARE = 0.5
 """Smallest share of the frames in which a taxel must be valid."""
 NOISY = 10.0
@@ -174,8 +177,8 @@ def moved_together(
     """Taxels (row, col) that rest as if they were touched.
 
     They form a region, of which each has moved by more than the threshold against the
-    former calibration, or, without one, stands out by more than the onset. A single
-    taxel is named.
+    former calibration, or, without one, stands out by more than the onset. Single
+    taxels are named.
     """
     limit = file.layout.onset
     if limit == 0:  # any noise would be above it
@@ -186,14 +189,15 @@ def moved_together(
     else:
         change = standing_out(file, baseline)
     taxels: list[tuple[int, int]] = []
+    lone: list[tuple[int, int]] = []
     for region in find_regions(change, limit, wraps=file.layout.wraps):
-        if region.area >= FEWEST_TOGETHER:
-            taxels += places(region.mask)
-        else:
-            LOG.warning(
-                f"taxel {list(places(region.mask)[0])} rests {region.peak} counts "
-                f"{_apart(former)}: if something touches it, calibrate again"
-            )
+        together = region.area >= FEWEST_TOGETHER
+        (taxels if together else lone).extend(places(region.mask))
+    if lone:
+        LOG.warning(
+            f"{counted(len(lone), 'taxel')} far {_apart(former)} at rest: "
+            f"{places_text(lone)}; if something touches them, calibrate again, and {BROKEN}"
+        )
     return taxels
 
 
@@ -228,30 +232,35 @@ def standing_out(file: SkinFile, baseline: Counts) -> Integers:
     return np.where(file.layout.alive, change.reshape(baseline.shape), 0)
 
 
-def check_rest(
+def problems(
     file: SkinFile,
     calibration: TaxelCalibration,
     former: TaxelCalibration | None,
-) -> None:
-    """Refuse a calibration that was measured on a touched or very noisy skin.
-
-    Raises:
-        InputError: the sentence names the taxels.
-    """
+) -> Iterator[str]:
+    """Sentences on a calibration that was measured on a touched or very noisy skin; they
+    name the taxels."""
+    noise = calibration.noise
+    restless = noisiest_taxels(noise)
+    if restless:
+        yield (
+            f"taxels that vary while they should be at rest: {len(restless)}, by up to "
+            f"{noise[restless[0]]:.1f} counts, {places_text(restless)}; keep everything "
+            f"off the skin; {BROKEN}"
+        )
     touched = moved_together(file, calibration.baseline, former)
     if touched:
-        raise InputError(
-            f"{counted(len(touched), 'taxel')} side by side rest {_apart(former)}, such "
-            f"as {list(touched[0])}, as if something leant on the skin; keep everything "
-            "off it, or use --force"
+        yield (
+            f"{counted(len(touched), 'taxel')} side by side rest {_apart(former)}, "
+            f"{places_text(touched)}, as if something leant on the skin; keep everything "
+            "off it"
         )
     deaf = deaf_taxels(replace(file, calibration=calibration))
     if deaf:
-        raise InputError(
-            f"{counted(len(deaf), 'taxel')} would be deaf, such as {list(deaf[0])}: a "
-            f"dead band of {file.signal.dead_band_sigma:g} times the noise reaches the "
+        yield (
+            f"{counted(len(deaf), 'taxel')} would be deaf, {places_text(deaf)}: a dead "
+            f"band of {file.signal.dead_band_sigma:g} times the noise reaches the "
             f"threshold of {file.layout.threshold_counts} counts; keep everything off "
-            "the skin, raise threshold_counts, or use --force"
+            "the skin, or raise threshold_counts"
         )
 
 
@@ -279,9 +288,8 @@ def replace_unusable(
     )
     if former is None or not force:
         raise InputError(
-            f"{problem}; check the chips with `edge-classify scan`, list broken taxels "
-            "under dead in [signal], or keep the taxels' former values, if any, with "
-            "--force"
+            f"{problem}; check the chips with `edge-classify scan`, {BROKEN}, or keep "
+            "the taxels' former values, if any, with --force"
         )
     LOG.warning(f"{problem}; their former values are kept")
     calibration.baseline[lost] = former.baseline[lost]
@@ -308,16 +316,10 @@ def run(arguments: argparse.Namespace) -> int:
         )
     replaced = replace_unusable(file, measured, former, arguments.force)
     noise = measured.calibration.noise
-    moving = noisiest_taxels(noise)
-    if moving and not arguments.force:
-        row, col = moving[0]
-        raise InputError(
-            f"taxels that vary while they should be at rest: {len(moving)}, most of "
-            f"all [{row}, {col}], by {noise[row, col]:.1f} counts; keep everything off "
-            "the skin, list broken taxels under dead in [signal], or use --force"
-        )
-    if not arguments.force:
-        check_rest(file, measured.calibration, former)
+    for problem in problems(file, measured.calibration, former):
+        if not arguments.force:
+            raise InputError(f"{problem}; or use --force")
+        LOG.warning(problem)
     backup = save_calibration(arguments.skin, measured.calibration)
     median = float(np.median(noise))
     largest = float(noise.max())
@@ -329,7 +331,7 @@ def run(arguments: argparse.Namespace) -> int:
         "noise_median": round(median, 3),
         "noise_largest": round(largest, 3),
         "kept": replaced,
-        "moving": moving,
+        "moving": noisiest_taxels(noise),
     }
     Output.of(arguments).event(
         event,

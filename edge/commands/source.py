@@ -177,6 +177,9 @@ class Reading:
                     "frames": SILENT_FRAMES,
                 }
                 events.append(taxels)
+            broken = skin.broken_changes()
+            if broken is not None:
+                events.append({"event": "broken", "t": t, "taxels": broken})
             events += [chip_event(status, t=t) for status in skin.changes()]
             yield frame, events
 

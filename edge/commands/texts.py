@@ -2,12 +2,14 @@
 
 import shutil
 import textwrap
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
-from edge.events import MOST_PLACES, json_line
+from edge.events import json_line
 
 LONGEST_LINE = 80
+MOST_PLACES = 6
+"""Taxels that a line for a person names."""
 Line = Mapping[str, Any]
 
 
@@ -24,6 +26,16 @@ def labels_text(labels: Mapping[str, str], between: str = ", ") -> str:
     'object=box, mobility=fixed'
     """
     return between.join(f"{task}={label}" for task, label in labels.items())
+
+
+def places_text(taxels: Sequence[Sequence[int]]) -> str:
+    """The first taxels of some.
+
+    >>> places_text([(3, 5), (0, 1)])
+    '[3, 5], [0, 1]'
+    """
+    more = " ..." if len(taxels) > MOST_PLACES else ""
+    return ", ".join(f"[{row}, {col}]" for row, col in taxels[:MOST_PLACES]) + more
 
 
 def event_text(line: Line) -> str:
@@ -95,14 +107,12 @@ def _taxels(line: Line) -> str:
     return _at(line["t"], f"{silent}: {line['invalid']}")
 
 
-def _aside(line: Line) -> str:
-    taxels = line["taxels"]
-    if not taxels:
-        return _at(line["t"], "all taxels are followed again")
-    places = ", ".join(f"({row}, {col})" for row, col in taxels[:MOST_PLACES])
-    more = " ..." if len(taxels) > MOST_PLACES else ""
+def _broken(line: Line) -> str:
+    if not line["taxels"]:
+        return _at(line["t"], "all taxels are trusted again")
+    places = places_text(line["taxels"])
     remedy = "free them, or list broken ones under dead in [signal]"
-    return _at(line["t"], f"ignored: taxels {places}{more}; {remedy}")
+    return _at(line["t"], f"ignored: taxels {places}; {remedy}")
 
 
 def _end(line: Line) -> str:
@@ -128,7 +138,7 @@ TEXTS: dict[str, Callable[[Line], str]] = {
     "chip": _chip,
     "bus": _bus,
     "taxels": _taxels,
-    "aside": _aside,
+    "broken": _broken,
     "end": _end,
     "saved": _saved,
     "no_contact": "no contact".format_map,

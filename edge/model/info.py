@@ -13,7 +13,6 @@ from edge.arrays import Floats
 from edge.elementary import log, logistic
 from edge.touch.features import feature_vector, widths
 from edge.touch.layout import SkinLayout, for_device
-from edge.touch.still import WatchfulTracker
 from edge.touch.track import ContactTracker
 
 if TYPE_CHECKING:
@@ -293,7 +292,7 @@ class ModelInfo:
         *,
         max_contacts: int = 1,
         motion_on_skin: bool = False,
-    ) -> WatchfulTracker:
+    ) -> ContactTracker:
         """A new tracker for a skin, with the model's rules and features.
 
         The options are those of `ContactTracker`.
@@ -311,4 +310,4 @@ class ModelInfo:
             max_contacts=max_contacts,
         )
         tracker.motion_on_skin = motion_on_skin
-        return WatchfulTracker(tracker)
+        return tracker

@@ -26,6 +26,9 @@ COARSE = 0.4
 SCALE_BITS = 12
 """The baseline is kept in 1/4096 counts, so that a slow drift is not lost to
 rounding."""
+HELD_S = 12.0
+"""The "maximum on duration" of capacitive chips' data sheets: what has been held for so
+long, ten times a usual window, is taken for a rest value that has moved."""
 FOLLOW_BITS = 2
 """A step is at most 1/4 of the distance, so that noise hardly moves the baseline."""
 
@@ -250,6 +253,7 @@ class Baseline:
         limit = signal.drift_limit_counts << SCALE_BITS
         self._low = self._now - limit
         self._high = self._now + limit
+        self._since_s = np.full(self._now.shape, np.inf)
 
     @property
     def counts(self) -> NDArray[np.int32]:
@@ -266,9 +270,19 @@ class Baseline:
         counts *= counts >= self._dead
         return np.asarray(np.minimum(counts, 65535), dtype=np.uint16)
 
+    def held(self, touched: Booleans, t: float) -> Booleans:
+        """(n,) which taxels have been touched for `HELD_S`; call it once a frame.
+
+        Args:
+            touched: (n,) which are touched.
+            t: seconds.
+        """
+        self._since_s = np.where(touched, np.minimum(self._since_s, t), np.inf)
+        return t - self._since_s >= HELD_S
+
     def follow(self, raw: Counts, valid: Booleans) -> None:
-        """Follow the drift of the `valid` taxels by a step; call it while nothing
-        touches."""
+        """Follow the drift of the `valid` taxels by a step; nothing must touch them, or
+        for too long."""
         error = (raw.astype(np.int32) << SCALE_BITS) - self._now
         error += 1 << (FOLLOW_BITS - 1)
         error >>= FOLLOW_BITS

@@ -18,6 +18,7 @@ from edge.errors import EdgeError, InputError
 from edge.skin.bus_reader import LONGEST_STEP_S, OLDEST_FRAMES, BusReader, State
 from edge.skin.decoder import Baseline, Decoder
 from edge.skin.file import SkinFile, TaxelCalibration, load
+from edge.skin.lone import LoneTaxels
 from edge.skin.wiring import BusSpec
 from edge.touch.frame import Frame
 
@@ -135,6 +136,9 @@ class Skin:
         self.invalid_for = np.zeros(shape, dtype=np.int64)
         """(rows, cols) number of frames in a row for which a taxel has had no valid
         value; 0 for a taxel that is dead or has no chip."""
+        self._lone = LoneTaxels(*shape, wraps=file.layout.wraps)
+        self._broken = self._lone.broken.copy()
+        """(rows, cols) the broken taxels that were last named."""
         self._silent = 0
         self._since_silent = 0
         self._touched_at = -math.inf
@@ -239,13 +243,21 @@ class Skin:
         self._since_silent = 0
         return silent
 
+    def broken_changes(self) -> list[list[int]] | None:
+        """[row, col] of the taxels that cannot be trusted (see `edge.skin.lone`), if
+        they have changed since the last call."""
+        if (self._lone.broken == self._broken).all():
+            return None
+        self._broken = self._lone.broken.copy()
+        return np.argwhere(self._broken).tolist()
+
     def read(self) -> Frame:
         """Read one frame.
 
         Returns:
             A frame whose `times` tell when each taxel was read. A taxel that could not
-            be read, is dead, or was last read more than `OLDEST_FRAMES` periods ago is
-            not `valid` and reads 0.
+            be read, is dead or broken, or was last read more than `OLDEST_FRAMES`
+            periods ago is not `valid` and reads 0.
         """
         clock = self.clock
         # The buses of a virtual clock start together.
@@ -257,7 +269,7 @@ class Skin:
         return self._assemble(t)
 
     def raw(self) -> tuple[Counts, Booleans]:
-        """The last frame's raw values (rows, cols), and which of them are valid."""
+        """The last frame's raw values (rows, cols), and which of them could be read."""
         return self._decoder.values.reshape(self.layout.shape), self._valid
 
     def _assemble(self, t: float) -> Frame:
@@ -269,18 +281,31 @@ class Skin:
         counts *= valid
         self.invalid_for += 1
         self.invalid_for *= (decoder.taxels.served & ~valid).reshape(shape)
+        is_calibrated = self.file.calibration is not None
+        held = self.baseline.held(counts > self.touch_counts, t)
+        trusted = valid
+        if is_calibrated and self.touch_counts:
+            of_skin = counts.reshape(shape)
+            self._lone.follow(of_skin, self.touch_counts, self._valid, t)
+            trusted = valid & ~self._lone.broken.ravel()
+            counts *= trusted
         # The baseline follows drift, except during a contact and shortly after it.
         if int(counts.max()) > self.touch_counts:
             self._touched_at = t
         settled = t - self._touched_at >= self.file.signal.settle_s
-        settled &= self.file.calibration is not None
-        if settled:
-            self.baseline.follow(decoder.values, valid)
+        settled &= is_calibrated
+        if is_calibrated:
+            self.baseline.follow(decoder.values, held | (trusted & settled))
         shear = None
         if self.shear is not None:
-            shear = self.shear.read(valid, settled=settled)
-        times = decoder.times.reshape(shape)
-        return Frame(t, counts.reshape(shape), self._valid, times, shear=shear)
+            shear = self.shear.read(trusted, settled=settled)
+        return Frame(
+            t,
+            counts.reshape(shape),
+            trusted.reshape(shape),
+            decoder.times.reshape(shape),
+            shear=shear,
+        )
 
     def close(self) -> None:
         """Stop the threads and close the buses; twice is fine."""

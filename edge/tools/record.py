@@ -23,7 +23,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from edge.arrays import Array, Floats
-from edge.classifier import AsideEvents, Classifier
+from edge.classifier import Classifier
 from edge.commands.options import add_reading, within
 from edge.commands.output import LOG
 from edge.commands.source import Opened, reading
@@ -41,7 +41,6 @@ from edge.tools.trial_options import add_arm, open_arm, task_label
 from edge.touch.arm import Chain
 from edge.touch.contact import Contact
 from edge.touch.frame import Frame
-from edge.touch.still import WatchfulTracker
 from edge.touch.track import DEBOUNCE, ContactTracker
 from edge.writing import NameTaken, check_writable
 
@@ -101,17 +100,10 @@ class Trials:
 
     A trial lasts from the lead-in before onset to the end of the contact, or to
     `length_s` after onset. No other trial begins while a saved contact continues.
-    Its frames are without what is set aside.
-
-    Attributes:
-        aside: names what is set aside.
     """
 
     def __init__(self, skin: Skin, length_s: float) -> None:
-        # The last second of a trial may be as still as it likes.
-        tracker = ContactTracker(skin.layout, horizon_s=length_s - 1.0)
-        self._tracker = WatchfulTracker(tracker)
-        self.aside = AsideEvents(self._tracker)
+        self._tracker = ContactTracker(skin.layout, horizon_s=length_s)
         self._length = length_s
         self._before: deque[Frame] = deque(
             maxlen=round(LEAD_S / skin.period_s) + DEBOUNCE
@@ -123,7 +115,6 @@ class Trials:
     def push(self, frame: Frame) -> list[Frame] | None:
         """Take in a frame; returns the frames of a trial that this frame completes."""
         contact = next(iter(self._tracker.push(frame)), None)
-        frame = self._tracker.latest or frame
         if self._frames is not None:
             self._frames.append(frame)
         else:
@@ -244,10 +235,7 @@ def run(arguments: argparse.Namespace) -> int:
         trials = Trials(live.skin, arguments.length)
         classifier = None if model is None else Classifier(model, live.skin.layout)
         for frame, faults in live.frames():
-            if classifier is None:
-                events = trials.aside.at(frame.t)
-            else:
-                events = classifier.push(frame)
+            events = [] if classifier is None else classifier.push(frame)
             lines.write([*faults, *(event.to_dict() for event in events)])
             live.show(frame, faults, events)
             recorder.follow(trials, events)

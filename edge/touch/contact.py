@@ -182,7 +182,7 @@ class Contact:
             the skin.
         ended: no more frames will come.
         speed: of the joints before onset in radians a second; NaN where not known.
-        late: it began before the first frame, or was set aside before.
+        late: it was under way in the first frame.
         missing_taxels: a frame lacked taxels that are not known to be dead.
         missing_pose: a frame came without the joint angles that a feature needs.
         region: the region when it was last seen.

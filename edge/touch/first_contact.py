@@ -4,11 +4,11 @@ from collections.abc import Iterable
 
 from edge.touch.contact import Contact, FeatureSeries
 from edge.touch.frame import Frame
-from edge.touch.still import Tracker
+from edge.touch.track import ContactTracker
 
 
 def first_contact(
-    frames: Iterable[Frame], tracker: Tracker
+    frames: Iterable[Frame], tracker: ContactTracker
 ) -> tuple[float, FeatureSeries] | None:
     """Onset in seconds and series of the first contact, or None without contact.
 
@@ -27,6 +27,4 @@ def first_contact(
             first.ended or frame.t - first.onset_s >= tracker.horizon_s
         ):
             break
-    if first is None:
-        first = next(iter(tracker.finish()), None)
     return None if first is None else (first.onset_s, first.series())

@@ -53,7 +53,7 @@ class SkinLayout:
     """A contact begins when its region's peak exceeds this; None:
     `threshold_counts`."""
     dead: tuple[int, ...] = ()
-    """Flat indices (row * cols + col) of taxels that can never be read."""
+    """Flat indices (row * cols + col) of taxels whose counts are left out."""
     release_s: float = RELEASE_S
     """A contact ends after this many seconds with no taxel above the threshold."""
     axes: int | None = None

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from edge.errors import InputError
@@ -110,15 +111,15 @@ class ContactTracker:
             InputError: the frame's shape is not the skin's, it lacks shear, its time
                 goes back, or a time or joint angle is not finite.
         """
-        self.check(frame)
-        return self.follow(frame, active_taxels(frame, self.layout))
-
-    def finish(self) -> list[Contact]:
-        """The contacts that only the end of the stream confirms."""
-        return []
-
-    def follow(self, frame: Frame, active: ActiveTaxels) -> list[Contact]:
-        """As `push`, of a frame that has been checked, by some of its active taxels."""
+        is_first = self._t == -math.inf
+        self._check(frame)
+        frame = self._living(frame)
+        active = ActiveTaxels(
+            frame.counts,
+            self.layout.threshold_counts,
+            valid=frame.valid,
+            wraps=self.layout.wraps,
+        )
         regions, shares = self._regions(active)
         self.region = regions[0] if regions else None
         for contact in self.contacts:
@@ -129,21 +130,19 @@ class ContactTracker:
             is_new = region not in shares.values()
             if room and is_new and region.peak > self.layout.onset:
                 contact = self._begin(frame, region)
+                contact.late = is_first
                 contacts.append(contact)
                 self._follow(contact, frame, active, region)
         self.contacts = [contact for contact in contacts if not contact.ended]
         return self._confirmed(contacts)
 
-    def end(self) -> list[Contact]:
-        """End the contact, and return it if it was confirmed. Of several contacts each
-        ends by itself."""
-        if self.max_contacts > 1:
-            return []
-        contacts = self.contacts
-        self.contacts = []
-        for contact in contacts:
-            contact.ended = True
-        return self._confirmed(contacts)
+    def _living(self, frame: Frame) -> Frame:
+        """The frame without the skin's dead taxels, whatever they read."""
+        if not self.layout.dead:
+            return frame
+        alive = self.layout.alive
+        valid = alive if frame.valid is None else alive & frame.valid
+        return replace(frame, counts=frame.counts * alive, valid=valid)
 
     def _confirmed(self, contacts: Sequence[Contact]) -> list[Contact]:
         """The contacts that have lasted long enough to count."""
@@ -193,7 +192,7 @@ class ContactTracker:
         elif released(contact.touched_s, age_s, self.layout.release_s):
             contact.ended = True
 
-    def check(self, frame: Frame) -> None:
+    def _check(self, frame: Frame) -> None:
         """Refuse a frame that does not follow the last one; see `push`."""
         if frame.counts.shape != self.layout.shape:
             raise InputError(
@@ -215,13 +214,3 @@ class ContactTracker:
         self._t = frame.t
         if self._measurer.joints is not None:
             self._measurer.joints.watch(frame)
-
-
-def active_taxels(frame: Frame, layout: SkinLayout) -> ActiveTaxels:
-    """The taxels of a frame above the threshold."""
-    return ActiveTaxels(
-        frame.counts,
-        layout.threshold_counts,
-        valid=frame.valid,
-        wraps=layout.wraps,
-    )

@@ -123,7 +123,7 @@ static void pool(
     uint32_t size) {
   for (uint32_t i = 0; i < size; i++) cells[i] = 0;
   for (uint32_t i = 0; i < TAXELS; i++) {
-    if (cell_of_taxel[i] >= 0 && (!valid || valid[i])) cells[cell_of_taxel[i]] += counts[i];
+    if (cell_of_taxel[i] >= 0 && EC_READABLE(valid, i)) cells[cell_of_taxel[i]] += counts[i];
   }
 }
 

@@ -144,6 +144,7 @@ typedef struct {
 extern const ec_angle ec_angles[];
 extern const ec_link ec_links[];
 extern const bool ec_alive[];
+#define EC_READABLE(valid, i) (ec_alive[i] && (!(valid) || (valid)[i]))
 extern const uint8_t ec_zone_names[]; /* EC_NO_ZONE comes last */
 extern const int16_t ec_cell_of_taxel[];
 extern const int16_t ec_kernel_cell_of_taxel[];

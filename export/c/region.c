@@ -69,7 +69,7 @@ void ec_largest(
   uint32_t begin = TAXELS;
   uint32_t end = 0;
   for (uint32_t i = 0; i < TAXELS; i++) {
-    active[i] = counts[i] > EC_THRESHOLD_COUNTS && (!valid || valid[i]);
+    active[i] = counts[i] > EC_THRESHOLD_COUNTS && EC_READABLE(valid, i);
     labels[i] = 0;
     if (!active[i]) continue;
     if (begin == TAXELS) begin = i;

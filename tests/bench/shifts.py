@@ -1,7 +1,7 @@
 """`make shifts`: do answers on touches unlike the training carry a doubt?
 
 A model is exported from a simulated set. Fresh touches of the same objects are changed
-as a robot's life changes them: taxels die or stick, counts double, a sleeve is put on,
+as a robot's life changes them: taxels die, counts double, a sleeve is put on,
 the skin turns on the arm, frames are lost or repeated, joint angles stop or come late.
 Others are simulated with another arm or with another effect of the sensors, from the
 same draws, or with objects that the training lacks. The board's own classifier decides
@@ -93,11 +93,6 @@ def half_dead(frames):
     return frames * alive
 
 
-def stuck(frames):
-    frames[:, 3, 5] = 2000.0
-    return frames
-
-
 def touched_from(recording):
     """The first frame with a taxel above the onset."""
     felt = recording.frames.max(axis=(1, 2)) > recording.layout.onset
@@ -131,7 +126,6 @@ SHIFTS = {
     "skin one column round": counts(lambda frames: np.roll(frames, 1, axis=2)),
     "skin a quarter round": counts(lambda frames: np.roll(frames, 6, axis=2)),
     "skin upside down": counts(lambda frames: frames[:, ::-1]),
-    "a taxel stuck at 2,000": counts(stuck),
     **{f"a gap of {ms} ms": paused((ms - 10) / 1000) for ms in (45, 90, 250)},
     "frozen frames": frozen,
     "joint angles constant": joints(partial(stopped, last=0)),

@@ -96,8 +96,7 @@ class Rig:
         rows, cols = file.layout.shape
         self.touch = np.zeros((30, rows, cols), np.uint16)
         # The last frames are equal, as Ctrl-C may come a frame earlier or later. The
-        # others differ, as what stays still in the slow guest's time is set aside. The
-        # touch is so firm that its labels are the same however slow that time is.
+        # touch is so firm that its labels are the same however slow the guest's time is.
         steps = np.arange(20, dtype=np.uint16).clip(max=15)
         rising = (30 + steps) * file.layout.onset
         self.touch[6:26, 1:4, cols - 4 : cols - 1] = rising[:, None, None]

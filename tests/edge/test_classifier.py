@@ -9,7 +9,7 @@ import pytest
 
 from edge.classifier import Classifier
 from edge.errors import InputError
-from edge.events import Aside, Decided, Onset, Release
+from edge.events import Decided, Onset, Release
 from tests.conftest import in_a_row
 from train.data.parts import part
 
@@ -115,18 +115,6 @@ def test_each_contact_gets_its_own_decisions_even_where_their_windows_overlap(
 def test_another_skin_is_refused(model, forearm):
     with pytest.raises(InputError, match="16 x 23"):
         Classifier(model, replace(forearm, cols=23))
-
-
-def test_a_stuck_taxel_is_named_and_hides_no_touch(model, make_touch):
-    recording = make_touch(seed=3)
-    frames = recording.frames.copy()
-    frames[:, 0, 23] = 500
-    events = list(Classifier(model).classify(replace(recording, frames=frames)))
-    (aside,) = (event for event in events if isinstance(event, Aside))
-    assert aside.taxels == ((0, 23),)
-    (onset,) = (event for event in events if isinstance(event, Onset))
-    assert onset.onset_s == 0.2
-    assert ["late" in event.flags for event in decisions(events)] == [False] * 2
 
 
 def test_a_touch_that_began_before_the_recording_is_flagged_late(model, make_touch):

@@ -291,6 +291,35 @@ def test_the_baseline_follows_as_pythons(tmp_path):
     assert np.unique(answer).size > 10
 
 
+RATES = (50, 100, 125, 200, 500, 1000)
+
+
+@pytest.mark.slow
+@needs_gcc
+def test_a_stream_of_any_rate_has_the_same_events(early, tmp_path):
+    """At once, and with few slices of work after each frame, so that a contact begins
+    while the last is being decided; smoothly, and in bursts."""
+    model, _ = early
+    error = max(s.rules[-1].error for s in model.info.stopping.values())
+    streams = []
+    for rate in RATES:
+        parts = [
+            touch(seed=i, seconds=seconds, rate=float(rate))
+            for i, seconds in enumerate((0.7, 0.7, 1.6))
+        ]
+        stream = in_a_row(*parts, rest=round(0.4 * rate))
+        stream = replace(stream, t=np.arange(len(stream.t)) / rate)
+        bursts = np.floor(stream.t * 12.0) / 12.0 + stream.t * 1e-3
+        streams += [stream, replace(stream, t=bursts)]
+    for error_rate in (None, error):
+        c_code.export(model, tmp_path, error_rate)
+        command = machine.compiled(tmp_path)
+        for slices in (0, 1, 40):
+            assert_same_events(model, tmp_path, command, streams, error_rate, slices)
+    kinds = {kind for s in streams for kind in machine.events(model, s)[:, 0].tolist()}
+    assert kinds == {0.0, 1.0, 2.0}
+
+
 @pytest.mark.slow
 @needs_gcc
 def test_a_frame_that_cannot_be_taken_in_is_an_error(tmp_path):

@@ -32,6 +32,13 @@ def test_a_folder_that_cannot_be_written_is_named_before_any_work(tmp_path, caps
     assert capsys.readouterr().err == sentence
 
 
+@pytest.mark.parametrize("taxel", ["3", "3,x", "1,2,3"])
+def test_a_taxel_is_a_row_and_a_column(taxel, capsys):
+    with pytest.raises(SystemExit):
+        main(["--data", ".", "--dead", "0,5", taxel])
+    assert "--dead: must be ROW,COL, such as 3,5" in capsys.readouterr().err
+
+
 @pytest.fixture(scope="module")
 def printed(recordings, tmp_path_factory):
     """What a quick export prints, and the description of its model."""

@@ -32,6 +32,7 @@ class FitOptions(Fixed):
     onset: int | None = None
     release: float | None = None
     arm: Chain | None = None
+    dead: Sequence[tuple[int, int]] = ()
     quick: bool = False
     jobs: int | None = None
     progress: bool = False
@@ -118,7 +119,7 @@ def trials_of(
     """The trials of recordings, up to the last of some windows, by thresholds that are
     given, saved, proposed or chosen."""
     features = features_tried(recordings, options, quick=options.quick)
-    measurement = Measurement(features, windows[-1], arm=options.arm)
+    measurement = Measurement(features, windows[-1], arm=options.arm, dead=options.dead)
 
     def by(
         threshold: int | None,

@@ -17,12 +17,13 @@ from importlib import import_module
 from pathlib import Path
 
 from edge.errors import InputError, printable
-from edge.recording import Recording
+from edge.recording import Recording, load
 from edge.saving import save
 from edge.tools.trial_options import add_arm, open_arm
 from edge.touch.arm import Chain
 from edge.writing import remove_leftovers
 from train import former_recordings
+from train.data.broken import BrokenTaxels
 from train.data.thresholds import count_felt, proposed
 from train.importers import Refused, Trial, names
 from train.progress import bar, say
@@ -105,6 +106,7 @@ def write(
 ) -> int:
     """Write the recordings of an importer; the exit status."""
     without_threshold: list[tuple[Path, Recording]] = []
+    taxels = BrokenTaxels()
     paths: set[Path] = set()
     skipped: list[str] = []
     for result in bar(trials, desc="importing", unit=" trials"):
@@ -121,6 +123,7 @@ def write(
             skipped.append(str(error))
             continue
         paths.add(path)
+        taxels.add(recording)
         if "threshold_counts" in recording.meta["skin"]:
             save(path, recording)
         else:
@@ -129,6 +132,8 @@ def write(
         raise InputError(skipped[0])
     if without_threshold:
         print(set_thresholds(without_threshold))
+    for warning in taxels.notes(load(min(paths)).layout) if paths else ():
+        say(warning)
     print(f"recordings written to {arguments.out}: {len(paths)}")
     return _status(arguments.out, paths, skipped)
 

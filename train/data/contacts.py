@@ -12,7 +12,6 @@ from edge.recording import Recording
 from edge.touch.contact import Contact, FeatureSeries
 from edge.touch.frame import Frame
 from edge.touch.layout import SkinLayout, for_device
-from edge.touch.still import Tracker, WatchfulTracker
 from edge.touch.track import ContactTracker
 from train.data.labels import completed, contradictory, labels_of
 
@@ -148,21 +147,19 @@ def follow(
     """The contacts of a recording, and the labels of those that are trials."""
     try:
         tracker = ContactTracker(for_device(layout, recording.layout), **tracked)
-        touches = contacts(recording, WatchfulTracker(tracker))
+        touches = contacts(recording, tracker)
         return touches, labels_of(recording, len(touches))
     except InputError as error:
         raise InputError(f"{path}: {error}") from None
 
 
 def contacts(
-    frames: Iterable[Frame], tracker: Tracker
+    frames: Iterable[Frame], tracker: ContactTracker
 ) -> list[tuple[float, FeatureSeries]]:
     """Onset in seconds and series of every contact of a recording, in their order."""
     followed: dict[int, Contact] = {}
     for frame in frames:
         followed |= {id(contact): contact for contact in tracker.push(frame)}
-    if not followed:
-        followed = {id(contact): contact for contact in tracker.finish()}
     return [(contact.onset_s, contact.series()) for contact in followed.values()]
 
 

@@ -264,6 +264,8 @@ class Measurement:
         release_s: seconds that a contact may be away and go on; those of the first
             recording where None.
         arm: for recordings with joint angles that name no arm.
+        dead: (row, col) of taxels that are left out, beside those that no frame of any
+            recording could read.
     """
 
     features: Sequence[str] = FEATURES
@@ -272,6 +274,7 @@ class Measurement:
     onset: int | None = None
     release_s: float | None = None
     arm: Chain | None = None
+    dead: Sequence[tuple[int, int]] = ()
 
     @cached_property
     def types(self) -> tuple[Feature, ...]:
@@ -289,11 +292,24 @@ class Measurement:
         return any(feature.of_joints for feature in self.types)
 
     def layout(self, data: Recordings) -> SkinLayout:
-        """The skin of recordings, as it is measured."""
+        """The skin of recordings, as it is measured.
+
+        Raises:
+            InputError: a dead taxel lies outside of it.
+        """
         skin = with_thresholds(data.of_owner[0].layout, self.threshold, self.onset)
         release_s = skin.release_s if self.release_s is None else self.release_s
-        dead = _dead(data.recordings)
-        return replace(skin, dead=dead, axes=axes(self.types), release_s=release_s)
+        dead = set(_dead(data.recordings))
+        for row, col in self.dead:
+            if row >= skin.rows or col >= skin.cols:
+                raise InputError(
+                    f"--dead {row},{col} lies outside of the skin, which has "
+                    f"{skin.rows} x {skin.cols} taxels, counted from 0"
+                )
+            dead.add(row * skin.cols + col)
+        return replace(
+            skin, dead=tuple(sorted(dead)), axes=axes(self.types), release_s=release_s
+        )
 
 
 USUAL = Measurement()

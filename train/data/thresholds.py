@@ -9,7 +9,6 @@ import numpy as np
 
 from edge.recording import Recording
 from edge.touch.layout import for_device
-from edge.touch.still import WatchfulTracker
 from edge.touch.thresholds import MARGIN, QUIET_S, above, noise
 from edge.touch.track import DEBOUNCE, ContactTracker
 from train.data.contacts import contacts, with_thresholds
@@ -138,7 +137,7 @@ def count_contacts(
     counts = []
     for recording in recordings:
         tracker = ContactTracker(for_device(layout, recording.layout), horizon_s=0.1)
-        counts.append(len(contacts(recording, WatchfulTracker(tracker))))
+        counts.append(len(contacts(recording, tracker)))
     return len(np.flatnonzero(counts)), sum(counts)
 
 

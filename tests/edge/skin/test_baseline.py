@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from edge.skin.decoder import Baseline
+from edge.skin.decoder import HELD_S, Baseline
 from edge.skin.file import Signal
 
 EVERY = np.ones(3, dtype=bool)
@@ -65,3 +65,11 @@ def test_noise_does_not_carry_it_away():
         still.follow(noisy, np.ones(400, dtype=bool))
     assert np.abs(still.counts - 1000).max() <= 5
     assert abs(float(np.mean(still.counts - 1000))) < 0.5
+
+
+def test_what_is_touched_for_ten_windows_without_a_pause_is_held():
+    values = baseline([1000] * 3)
+    for t in (0.0, 0.5 * HELD_S, HELD_S - 0.01):
+        assert not values.held(np.array([True, t != 0.5 * HELD_S, False]), t).any()
+    held = values.held(np.array([True, True, False]), HELD_S)
+    assert held.tolist() == [True, False, False]

@@ -97,6 +97,18 @@ def test_the_baseline_follows_drift_until_something_touches():
     assert held[-1] - held[0] in range(28, 32)
 
 
+def test_the_baseline_follows_what_is_held_for_ten_windows():
+    leant = np.zeros((16, 24), dtype=np.uint16)
+    leant[:2, :2] = 300
+    with fake_skin(CHIP, lambda t: leant * (t >= 1.0)) as skin:
+        counts = {
+            round(f.t, 2): f.counts[1, 1] for f in Loop(skin, lasts_s=16.0).frames()
+        }
+    start = min(counts)
+    assert [counts[round(start + s, 2)] for s in (1.1, 12.9)] == [300, 300]
+    assert counts[round(start + 15.0, 2)] in range(258, 263)
+
+
 def test_a_skin_without_a_single_chip_says_so():
     clock = VirtualClock()
     file = calibrated(PAD)

@@ -202,7 +202,7 @@ def test_record_saves_one_trial_a_contact_and_never_overwrites(record, brief, tr
     assert names == [f"foam-a_b_c-00{n}.npz" for n in (1, 2, 3)]
 
 
-def test_record_names_a_broken_taxel_and_leaves_it_out_of_the_trials(
+def test_record_names_a_broken_taxel_which_is_not_valid_in_its_trials(
     record, make_touch, tmp_path
 ):
     touches = in_a_row(*[make_touch(seed=seed) for seed in (0, 1)], rest=60)
@@ -210,11 +210,11 @@ def test_record_names_a_broken_taxel_and_leaves_it_out_of_the_trials(
     touches.frames[:, 15, 8] += flickers.astype(np.uint16)
     save(tmp_path / "flickers.npz", touches)
     _, events, _ = record(fake=tmp_path / "flickers.npz")
-    (aside,) = (event for event in events if event["event"] == "aside")
-    assert aside["taxels"] == [[15, 8]]
-    files = [event["file"] for event in events if event["event"] == "saved"]
-    trials = [load(file).frames for file in files]
-    assert [trial[:, 15, 8].max() for trial in trials] == [500, 0]
+    (broken,) = (event for event in events if event["event"] == "broken")
+    assert broken["taxels"] == [[15, 8]]
+    trial = load([event["file"] for event in events if event["event"] == "saved"][-1])
+    assert not trial.valid[:, 15, 8].any()
+    assert not trial.frames[:, 15, 8].any()
 
 
 def test_record_without_contact_saves_nothing(record, quiet, trials):

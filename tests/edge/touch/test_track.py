@@ -38,6 +38,15 @@ def test_one_frame_alone_begins_no_contact():
     assert follow([0, 30, 0], AT_ONCE) == [(0.01, [30, 0], False)]
 
 
+@pytest.mark.parametrize(("peaks", "late"), [([30, 30], True), ([0, 30, 30], False)])
+@pytest.mark.parametrize("most", [1, 2])
+def test_a_contact_that_is_under_way_in_the_first_frame_is_late(peaks, late, most):
+    tracker = ContactTracker(FLAT, max_contacts=most)
+    frames = [pressed(FLAT, i / 100, {(1, 1): peak}) for i, peak in enumerate(peaks)]
+    (contact,) = [tracker.push(frame) for frame in frames][-1]
+    assert contact.late == late
+
+
 def test_a_contact_begins_above_the_upper_threshold_and_lasts_to_the_lower():
     assert follow([15, 15, 20, 20]) == []
     hovering = [25, 25, 15, 25, 12, 15, 15, 15]

@@ -103,7 +103,7 @@ def outputs(model, point, vector):
 
 def vectors(model, points, recording):
     """As `give_vectors`: of the first contact, each when its window ends."""
-    tracker = model.info.tracker(recording.layout).tracker
+    tracker = model.info.tracker(recording.layout)
     windows_s = [model.decision_points_s[point] for point in points]
     measured = []
     contact = None

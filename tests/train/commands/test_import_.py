@@ -38,6 +38,18 @@ def test_data_without_thresholds_get_those_of_their_noise(make_touch, tmp_path, 
     assert load(tmp_path / "own" / "trial0.npz").layout.threshold_counts == 90
 
 
+def test_a_taxel_that_is_constant_in_the_whole_set_is_named(
+    make_touch, tmp_path, capsys
+):
+    for seed in range(3):
+        touch = make_touch(seed=seed, seconds=0.1, lead_s=0.1, arm=False)
+        touch.frames[:, 0, 5] = 7
+        write_frames(tmp_path / "csv" / f"trial{seed}", touch.t, touch.frames)
+    words = ["import", "csv", str(tmp_path / "csv"), "--frames", "--out"]
+    assert main([*words, str(tmp_path / "out")]) == 0
+    assert "[0, 5]; `edge-classify export --dead 0,5`" in capsys.readouterr().err
+
+
 def test_warnings_that_are_alike_are_counted(make_touch, tmp_path, capsys):
     for name in "abc":
         touch = make_touch(seconds=0.05, lead_s=0.0, arm=False)

@@ -144,6 +144,11 @@ def test_a_taxel_is_dead_that_no_frame_of_any_recording_could_read(
         assert load_trials([tmp_path]).layout.dead == dead
 
 
+def test_a_dead_taxel_that_the_skin_does_not_have_is_refused(folder):
+    with pytest.raises(InputError, match="--dead 16,0 lies outside .* 16 x 24"):
+        load_trials([folder], Measurement(dead=[(15, 23), (16, 0)]))
+
+
 def test_the_few_that_lack_joint_angles_do_not_take_them_from_the_others(
     folder, make_touch
 ):
