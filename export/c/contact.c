@@ -18,7 +18,7 @@ bool ec_released(double touched_s, double now_s) {
 
 /* A point of the skin in the frame of its link. */
 static void skin_point(double row, double col, double point[3]) {
-  double angle = TURN * col / EC_COLS;
+  double angle;
   point[0] = col * EC_AROUND;
   point[1] = row * EC_ALONG;
   point[2] = 0.0;
@@ -27,6 +27,8 @@ static void skin_point(double row, double col, double point[3]) {
     uint32_t column = (uint32_t)col;
     const ec_angle *place = &ec_angles[column % EC_COLS];
     angle = (place->angle_deg + (col - column) * place->step_deg) * RADIANS;
+  } else {
+    angle = TURN * col / EC_COLS;
   }
   point[0] = EC_RADIUS_M * ec_cos(angle);
   point[1] = EC_RADIUS_M * ec_sin(angle);

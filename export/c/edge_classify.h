@@ -11,6 +11,10 @@
 
 #include "model.h"
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 typedef enum { EC_ONSET_EVENT, EC_RELEASE_EVENT, EC_DECIDED_EVENT } ec_kind;
 typedef enum { EC_NOTHING, EC_CONFIDENCE, EC_WINDOW } ec_stopped_by;
 
@@ -51,6 +55,10 @@ enum {
 
 #define EC_MOST_EVENTS (EC_TASKS + 2)
 
+/* Whether this program computes with the bits that it should, which options of a compiler change; call
+   it before ec_begin. */
+bool ec_selftest(void);
+
 /* Forget all: before the first frame, and where the stream has had a gap. */
 void ec_begin(void);
 
@@ -80,5 +88,9 @@ void ec_finish(void);
 
 extern const char *const ec_task_names[];
 extern const char *const *const ec_labels[]; /* of each task */
+
+#ifdef __cplusplus
+}
+#endif
 
 #endif

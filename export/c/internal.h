@@ -10,14 +10,20 @@
 #include "edge_classify.h"
 
 /* A sum that is fused with its product has other bits. gcc knows no pragma against it: where the
-   processor has such an instruction, say that -ffp-contract=off is given. */
-#if defined(__FP_FAST_FMA) && !defined(EC_NO_CONTRACTION)
+   processor has such an instruction for doubles, say that -ffp-contract=off is given. */
+#if defined(__clang__) || !defined(__GNUC__)
+#pragma STDC FP_CONTRACT OFF
+#elif !defined(EC_NO_CONTRACTION)
+#if defined(__FP_FAST_FMA) || defined(__FMA__) || defined(__FMA4__)
 #error "compile with -ffp-contract=off -DEC_NO_CONTRACTION"
+#elif defined(__ARM_FEATURE_FMA) && defined(__ARM_FP) && (__ARM_FP & 8)
+#error "compile with -ffp-contract=off -DEC_NO_CONTRACTION"
+#endif
 #endif
 #if defined(__ASSOCIATIVE_MATH__) || defined(__RECIPROCAL_MATH__) || __FINITE_MATH_ONLY__
 #error "compile without -ffast-math and the options of which it consists"
 #endif
-#if DBL_MANT_DIG != 53 || FLT_EVAL_METHOD != 0
+#if DBL_MANT_DIG != 53 || (FLT_EVAL_METHOD != 0 && FLT_EVAL_METHOD != 1)
 #error "doubles must have 64 bits, and be computed as these, not in wider registers"
 #endif
 
@@ -254,6 +260,9 @@ extern const double ec_novel[];
 extern const double ec_remote[];
 extern const double ec_middles[];
 extern const double ec_slopes[];
+extern const uint64_t ec_checksum; /* of the outputs for features that are all EC_PROBE */
+#define EC_PROBE 0.3
+#define EC_PROBES 8
 
 /* graph.c: edge/model/graph.py */
 extern double ec_arena[EC_ARENA];

@@ -20,6 +20,7 @@ int main(void) {
   static uint16_t counts[EC_ROWS * EC_COLS];
   ec_event events[EC_MOST_EVENTS];
   double t_s;
+  if (!ec_selftest()) return 1;
   ec_begin();
   while (scanf("%lf", &t_s) == 1) {
     for (int i = 0; i < EC_ROWS * EC_COLS; i++) {

@@ -25,3 +25,4 @@ const double ec_novel[] = $novel;
 const double ec_remote[] = $remote;
 const double ec_middles[] = $middles;
 const double ec_slopes[] = $slopes;
+const uint64_t ec_checksum = UINT64_C($checksum);

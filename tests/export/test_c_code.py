@@ -351,6 +351,37 @@ def test_options_that_change_bits_do_not_compile(tmp_path):
         assert b"#error" in ended.stderr
 
 
+@needs_gcc
+@pytest.mark.skipif(
+    " fma " not in Path("/proc/cpuinfo").read_text(),
+    reason="this machine fuses nothing",
+)
+@pytest.mark.parametrize("contract", ["off", "fast"])
+def test_the_selftest_tells_fused_instructions(tmp_path, contract):
+    c_code.export(Model(demo.MODEL), tmp_path)
+    options = f"-mfma -ffp-contract={contract} -DEC_NO_CONTRACTION".split()
+    command = machine.compiled(tmp_path, options=options)
+    passed = machine.ask(command, tmp_path, [machine.ABOUT_ITSELF])
+    assert passed.tolist() == [contract == "off"]
+
+
+@pytest.mark.slow
+@needs_qemu
+@pytest.mark.parametrize(("board", "index"), [("M4F", 0), ("M0+", 1)])
+def test_the_cost_that_export_prints_is_what_qemu_counts(early, tmp_path, board, index):
+    for model, recording in (
+        (early[0], early[1][0]),
+        (Model(demo.MODEL), load(demo.FOLDER / "pillow-movable.npz")),
+    ):
+        source = c_code.Source(model)
+        source.write(tmp_path)
+        command = [*machine.compiled(tmp_path, board), "-icount", "shift=0"]
+        question = machine.about_recording(machine.COSTS, recording)
+        *_, slice_, decision = machine.ask(command, tmp_path, [question])
+        assert source.instructions()[index] == pytest.approx(decision, rel=0.1)
+        assert slice_ < (100e3, 300e3)[index]
+
+
 def test_what_c_lacks_is_one_sentence(tmp_path):
     model = Model(demo.MODEL)
     info = model.info

@@ -24,8 +24,8 @@ def assert_same(model, folder, recordings, vectors=(), error=None, board=None):
     command = machine.compiled(folder, board)
     last = len(model.decision_points_s) - 1
     points = [last] if error is None else [*range(last + 1)]
-    questions = []
-    expected = []
+    questions = [machine.ABOUT_ITSELF]
+    expected = [[1.0]]
     for i, vector in enumerate(vectors):
         point = i % len(points)
         questions.append(machine.about_vector(point, vector))

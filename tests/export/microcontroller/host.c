@@ -6,7 +6,7 @@
 #include "internal.h"
 
 /* Behind the last one, the slices of a decision for each frame are added. */
-enum { VECTOR, VECTORS_OF_RECORDING, BASELINE, COSTS, EVENTS_OF_RECORDING };
+enum { VECTOR, VECTORS_OF_RECORDING, BASELINE, COSTS, SELFTEST, EVENTS_OF_RECORDING };
 
 typedef struct {
   double t;
@@ -189,6 +189,9 @@ int main(void) {
       follow(question[1]);
     } else if (question[0] == COSTS) {
       measure(question[1]);
+    } else if (question[0] == SELFTEST) {
+      double passed = ec_selftest();
+      give(&passed, 1);
     } else {
       classify(question[1], question[0] - EVENTS_OF_RECORDING);
     }

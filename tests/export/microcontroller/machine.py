@@ -11,7 +11,9 @@ from edge.classifier import Classifier, suited
 from edge.events import Decided, Onset, Release
 
 HERE = Path(__file__).parent
-VECTOR, VECTORS_OF_RECORDING, BASELINE, COSTS, EVENTS_OF_RECORDING = range(5)
+VECTOR, VECTORS_OF_RECORDING, BASELINE, COSTS, SELFTEST, EVENTS_OF_RECORDING = range(6)
+ABOUT_ITSELF = struct.pack("<II", SELFTEST, 0)
+"""The question whether `ec_selftest` passes."""
 WARNINGS = "-Wall -Wextra -Werror -Wconversion -Wdouble-promotion -pedantic"
 COMMON = f"-std=c99 -O2 -ffp-contract=off {WARNINGS}".split()
 SANITIZED = "-fsanitize=undefined,address -fno-sanitize-recover=all".split()
@@ -47,12 +49,22 @@ def tools(board):
     return gcc, qemu.split()
 
 
-def compiled(folder, board=None):
+def compiled(folder, board=None, options=SANITIZED):
     """The command that answers `input.bin` in a folder of C."""
     rooms = [path for path in folder.glob("*.c") if path.name != "main.c"]
     program = folder / f"answer-{board or 'host'}"
-    gcc, command = tools(board) if board else (["gcc", *SANITIZED], [])
-    words = [*gcc, *COMMON, "-I", folder, *rooms, HERE / "host.c", "-o", program]
+    gcc, command = tools(board) if board else (["gcc"], [])
+    words = [
+        *gcc,
+        *COMMON,
+        *([] if board else options),
+        "-I",
+        folder,
+        *rooms,
+        HERE / "host.c",
+        "-o",
+        program,
+    ]
     subprocess.run(words, check=True)
     return [*command, program]
 
