@@ -33,6 +33,8 @@ ROOMS = Path(__file__).parent / "c"
 CODE_BYTES = 26 * 1024
 """Of all rooms, with small tables and the arithmetic of doubles, by gcc 12 with -O2 for a
 Cortex-M0+."""
+KERNEL_BYTES = 4608
+"""Of the code of kernels, and of the channels that each sums up."""
 COSTS = {
     "task": (14000, 27000),
     "convolution": (6600, 8900),
@@ -241,6 +243,8 @@ class Source:
         for name in ("taxel_kernels", "zone_kernels"):
             table = self._info.kernels.get(name, KernelTable((), ()))
             self.values[name] = kernel_fields(table)
+            if table.shifts:
+                self.flash += KERNEL_BYTES + 4 * len(table.biases)
         return summed
 
     def _skin(self) -> None:
@@ -314,7 +318,7 @@ class Source:
             outputs = [*step.outputs, *[0] * (3 - len(step.outputs))]
             steps.append([inputs, outputs, step.sizes, step.operator])
         most_columns = max((table.columns for table in graph.tables), default=0)
-        self.flash += 26 * len(graph.steps)
+        self.flash += 26 * len(graph.steps) + 20 * len(graph.tables)
         self.ram += 8 * (graph.arena + most_columns) + REST_OF_RAM
         self.values |= {
             "arena": graph.arena,
