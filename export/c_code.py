@@ -23,6 +23,7 @@ from edge.model.model import Model
 from edge.touch import measures, transforms
 from edge.touch.cells import KERNEL_CELLS, Cells
 from edge.touch.contact import feature_types
+from edge.touch.doubts import GAP_S, PERIODS
 from edge.touch.kernels import BIASES, CONVOLUTIONS, KernelTable, mixes
 from edge.touch.layout import SkinLayout
 from edge.touch.zones import Zones
@@ -38,7 +39,6 @@ KERNEL_BYTES = 4608
 COSTS = {
     "task": (14000, 27000),
     "convolution": (6600, 8900),
-    "value": (30, 40),
     "root": (1340, 3100),
     "row": (704, 1365),
     "product": (12.8, 49.3),
@@ -47,8 +47,10 @@ COSTS = {
 """Instructions of a Cortex-M4F and of a Cortex-M0+ for the parts of a decision, fitted
 to what QEMU counted: roots and logarithms of values, rows of projections, products of
 matrices, and numbers that other steps of the graph take."""
-REST_OF_RAM = 2048 + 1900
+REST_OF_RAM = 2048 + 3100
 """Of the stack, and of what does not depend on the model."""
+LONG_STEP_S = 0.95 * GAP_S / PERIODS
+"""No usual step of at most this time makes a longer pause usual."""
 LARGEST = 2**63
 """No product of a frame's sums may reach it."""
 MOST_SUMMED = 128
@@ -152,6 +154,8 @@ class Source:
         self.values: dict[str, object] = {
             "early": error is not None,
             "windows_s": windows_s[-self._last :],
+            "long_step_s": LONG_STEP_S,
+            "long_steps": int(model.info.window_s / LONG_STEP_S) + 2,
         }
         for owner, names in ((self._layout, OF_LAYOUT), (self._info, OF_INFO)):
             self.values |= {name: getattr(owner, name) or 0 for name in names}
@@ -193,53 +197,40 @@ class Source:
     def _features(self) -> int:
         """The `ec_course` and the `ec_feature` of each feature, and the tables of the
         kernels, from which some are computed; how many doubles summaries take."""
-        courses = []
+        courses: dict[tuple[object, ...], int] = {}
+        places = [0]
+        rows = []
         summed = 0
         for feature, width in zip(self._types, self._info.widths, strict=True):
             samples = feature.samples or self._info.samples
-            if feature.kernels:
-                self.work["convolution"] += CONVOLUTIONS
             sums_up = feature.summary not in ("", "rate")
             count = width if sums_up else width // samples
+            alone = (feature.zone, feature.quantity) in ALONE
+            of_region = "REGION_" * (alone and feature.zone == "contact")
+            quantity = f"EC_Q_{of_region}{feature.quantity.upper()}"
+            zone = 0 if alone else self._zones.index(feature.zone)
+            course = samples, count, zone, quantity.replace("CHANGE", "ANGLE")
+            if feature.kernels:
+                self.work["convolution"] += CONVOLUTIONS
+            elif course not in courses:
+                courses[course] = len(courses)
+                places.append(places[-1] + samples * count)
             if sums_up:
                 together = count if "relative" in feature.transforms else 1
                 summed = max(summed, samples * together)
-            alone = (feature.zone, feature.quantity) in ALONE
-            of_region = "REGION_" * (alone and feature.zone == "contact")
-            if not feature.kernels:
-                self.work["value"] += samples * count
-                roots = len({"log", "sqrt"}.intersection(feature.transforms))
-                self.work["root"] += samples * count * roots
-            quantity = f"EC_Q_{of_region}{feature.quantity.upper()}"
-            zone = self._zones.index(feature.zone) if not alone else 0
-            measured = quantity.replace("JOINT_CHANGE", "JOINT_ANGLE")
-            courses.append((samples, count, measured, 0 if feature.kernels else zone))
-        rows = []
-        order = sorted(
-            {c for c, f in zip(courses, self._types, strict=True) if not f.kernels}
-        )
-        for feature, course in zip(self._types, courses, strict=True):
+            roots = {"log", "sqrt"}.intersection(feature.transforms)
+            self.work["root"] += (samples * count * len(roots)) * (not feature.kernels)
             row = [
                 transforms.floor_of(feature, self._layout),
-                order.index(course) if course in order else 0,
-                course[2].replace("JOINT_ANGLE", feature.quantity.upper()),
+                courses.get(course, 0),
+                quantity,
                 [f"EC_T_{kind.upper()}" for kind in feature.transforms],
                 f"EC_S_{feature.summary.upper()}",
             ]
             rows.append(row)
-        sizes = [samples * count for samples, count, _, _ in order]
-        places = np.cumsum([0, *sizes])
-        self.values |= {
-            "features": rows,
-            "courses": [
-                [samples, count, place, zone, measured]
-                for (samples, count, measured, zone), place in zip(
-                    order, places, strict=False
-                )
-            ],
-            "values_count": str(places[-1]),
-        }
-        self.ram += self._last * 8 * int(places[-1])
+        fields = [[*c, place] for c, place in zip(courses, places, strict=False)]
+        self.values |= {"features": rows, "courses": fields, "value_count": places[-1]}
+        self.ram += self._last * 8 * places[-1]
         for name in ("taxel_kernels", "zone_kernels"):
             table = self._info.kernels.get(name, KernelTable((), ()))
             self.values[name] = kernel_fields(table)
@@ -260,7 +251,7 @@ class Source:
         unsure = 2 * len(self._zones) + 3 + self._info.joints
         row = 40 + 8 * max(self._info.joints, 1) + 121 * zones + 8 * unsure
         row += 4 * max(pooled, 1) + 4 * max(pooled_for_kernels, 1)
-        self.ram += 4 * row + 48 * unsure + 7 * layout.alive.size
+        self.ram += 4 * row + 48 * unsure + 9 * layout.alive.size
         self.ram += self._last * 240 * (zone_channels + pooled_for_kernels)
         self.values |= {
             "cells": pooled,
@@ -314,9 +305,7 @@ class Source:
         steps = []
         for step in graph.steps:
             self._weigh(step, graph)
-            inputs = [*step.inputs, *[0] * (5 - len(step.inputs))]
-            outputs = [*step.outputs, *[0] * (3 - len(step.outputs))]
-            steps.append([inputs, outputs, step.sizes, step.operator])
+            steps.append([step.inputs, step.outputs, step.sizes, step.operator])
         most_columns = max((table.columns for table in graph.tables), default=0)
         self.flash += 26 * len(graph.steps) + 20 * len(graph.tables)
         self.ram += 8 * (graph.arena + most_columns) + REST_OF_RAM
@@ -330,26 +319,18 @@ class Source:
 
     def _weigh(self, step: Step, graph: CompiledGraph) -> None:
         """Count the work of a step."""
-        before, along, behind, count = [*step.sizes, 1, 1, 1][:4]
-        match step.operator.removeprefix("EC_").title():
-            case "Project":
-                matrix = graph.tables[step.inputs[3] - graph.arena]
-                self.work["row"] += along
-                self.work["product"] += along * matrix.columns
-            case "Gemm" | "Matmul":
-                self.work["product"] += along * count
-            case "Sqrt":
-                self.work["root"] += before
-            case "Topk":
-                self.work["number"] += before * along
-            case "Finite":
-                self.work["number"] += along / 4
-            case "Gather" | "Gatherelements" | "Gathernd":
-                self.work["number"] += before * behind * count
-            case operator if operator.startswith("Reduce"):
-                self.work["number"] += before * along * behind
-            case _:
-                self.work["number"] += before
+        size, along, behind, count = [*step.sizes, 1, 1, 1][:4]
+        if step.operator == "EC_PROJECT":
+            self.work["row"] += along
+            count = graph.tables[step.inputs[3] - graph.arena].columns
+        if step.operator in ("EC_PROJECT", "EC_GEMM", "EC_MATMUL"):
+            self.work["product"] += along * count
+        elif step.operator.startswith(("EC_REDUCE", "EC_TOPK")):
+            self.work["number"] += size * along * behind
+        elif step.operator.startswith("EC_GATHER"):
+            self.work["number"] += size * behind * count
+        else:
+            self.work["number"] += size
 
     def _tasks(
         self, places: Mapping[str, int], rules: Mapping[str, StoppingRule | None]
@@ -368,6 +349,7 @@ class Source:
                 [places.get(f"{name}_{end}", 0) for end in ENDS],
                 len(task.labels),
                 task.k,
+                self._excused(task.labels),
                 indices,
                 [names.index(factor) for factor in task.factors],
             ]
@@ -380,6 +362,11 @@ class Source:
             "labels": labels,
             "task_names": map(quoted, names),
         }
+
+    def _excused(self, labels: Iterable[str]) -> object:
+        """Which labels' trials had regions beside the contact; 0 if none had."""
+        several = [label in self._info.several_labels for label in labels]
+        return array("bool", several) if any(several) else 0
 
     def _curves(self, task: str) -> list[object]:
         """The curves of a task: those of the decision points, and that of the rules."""

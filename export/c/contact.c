@@ -9,6 +9,7 @@
 ec_contact ec_now; /* the contact that is followed */
 static ec_row newest; /* a later reading of its instant may still replace it */
 static double settled_motions[2]; /* of the frame before it */
+static uint16_t before[TAXELS]; /* the counts of the last row */
 static ec_set active;
 static ec_region region;
 
@@ -101,6 +102,7 @@ static void settle_newest(uint32_t first_point) {
     if (newest.motions[i] == newest.motions[i]) ec_now.starts[i].is_settled = true;
   }
   ec_samples_take(&newest, first_point);
+  ec_doubts_take(&newest);
 }
 
 static void move(ec_row *row, const double *joints) {
@@ -141,6 +143,12 @@ static void add(
   for (uint32_t i = 0; valid && i < TAXELS; i++) {
     if (!valid[i] && ec_alive[i]) ec_now.missing_taxels = true;
   }
+  newest.same = ec_now.has_row;
+  for (uint32_t i = 0; i < TAXELS; i++) {
+    if (counts[i] != before[i]) newest.same = false;
+    before[i] = counts[i];
+  }
+  newest.beside = region.beside;
   newest.t = age_s;
   newest.peak = region.peak;
   newest.area = region.area;
@@ -174,6 +182,7 @@ int ec_follow(
     ec_now.under_way = true;
     ec_now.onset_s = t;
     ec_samples_begin();
+    ec_doubts_begin();
   }
   double age_s = t - ec_now.onset_s;
   bool confirmed = ec_now.frames >= EC_DEBOUNCE;
@@ -195,5 +204,12 @@ int ec_follow(
   return 0;
 }
 
-/* The frames so far are all that count for a decision point. */
-void ec_close(uint32_t point) { ec_samples_close(point, &newest); }
+/* The frames so far are all that count for a decision point; returns reasons to doubt them. */
+uint16_t ec_close(uint32_t point) {
+  ec_samples_close(point, &newest);
+  uint16_t doubts = ec_doubts(&newest, ec_windows_s[point]);
+  if (ec_now.missing_taxels) doubts |= EC_MISSING_TAXELS;
+  if (ec_now.missing_pose) doubts |= EC_MISSING_POSE;
+  if (ec_now.late) doubts |= EC_LATE;
+  return doubts;
+}

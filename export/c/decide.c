@@ -141,6 +141,10 @@ static bool ask_all(void) {
   for (uint32_t i = 0; i < EC_TASKS && !refused; i++) {
     if (ec_tasks[i].indices[0]) agree(i);
   }
+  for (uint32_t i = 0; i < EC_TASKS && !refused; i++) {
+    const bool *excused = ec_tasks[i].excused;
+    if (excused && excused[agreed[i]]) question.doubts &= (uint16_t)~EC_SEVERAL;
+  }
   for (uint32_t i = 0; i < EC_TASKS; i++) {
     if (!decided[i]) ask(i, refused);
   }
@@ -254,11 +258,8 @@ bool ec_is_due(void) { return phase != IDLE || asked < due; }
 
 /* Put a question about what has been felt so far. */
 static void put(uint32_t point, double t_s, bool is_short) {
-  uint16_t doubts = flag(is_short, EC_SHORT);
-  doubts |= flag(ec_now.missing_taxels, EC_MISSING_TAXELS);
-  doubts |= flag(ec_now.missing_pose, EC_MISSING_POSE);
+  uint16_t doubts = ec_close(point) | flag(is_short, EC_SHORT);
   ec_question next = {t_s, ec_now.onset_s, point, doubts, due == 0};
-  ec_close(point);
   questions[due++] = next;
 }
 
@@ -271,10 +272,12 @@ int ec_push(
   for (uint32_t i = joints ? EC_DOF : 0; i-- > 0;) {
     if (!(joints[i] >= -1e6 && joints[i] <= 1e6)) return EC_BAD_JOINTS;
   }
-  last_s = t_s;
+  bool is_first = last_s == -EC_INFINITY;
   if (ec_now.ended) announced = false;
   int error = ec_follow(counts, valid, t_s, joints, announced ? due : 0, is_busy);
   if (error) return error;
+  last_s = t_s;
+  if (is_first) ec_now.late = ec_now.under_way;
   if (!ec_now.under_way || ec_now.frames < EC_DEBOUNCE) return 0;
   ec_event event = {EC_ONSET_EVENT, t_s, ec_now.onset_s, 0.0, 0.0, 0, -1, 0, 0, EC_NOTHING};
   if (!announced) {

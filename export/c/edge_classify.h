@@ -29,7 +29,11 @@ enum {
   EC_UNKNOWN = 64,
   EC_TIE = 128,
   EC_UNSURE = 256,
-  EC_UNCERTIFIED = 512
+  EC_UNCERTIFIED = 512,
+  EC_GAP = 1024,
+  EC_FROZEN = 2048,
+  EC_SEVERAL = 4096,
+  EC_LATE = 8192
 };
 
 typedef struct {

@@ -1,4 +1,5 @@
-/* What the rooms share. Data flows one way: region, contact, samples, features, graph, decide. */
+/* What the rooms share. Data flows one way: region, contact, samples and doubts, features,
+   graph, decide. */
 #ifndef EC_INTERNAL_H
 #define EC_INTERNAL_H
 
@@ -46,6 +47,7 @@ typedef struct {
   uint32_t end;
   uint32_t area;
   uint16_t peak;
+  bool beside; /* another one is above the onset */
   ec_set taxels;
 } ec_region;
 
@@ -84,6 +86,8 @@ typedef struct {
   uint32_t kernel_cells[EC_AT_LEAST_1(EC_KERNEL_CELLS)];
   uint32_t area; /* 0 without contact */
   uint16_t peak;
+  bool same; /* as the frame before it, bit for bit */
+  bool beside; /* another region is above the onset */
   /* samples.c fills in the others */
   bool is_spread[EC_AT_LEAST_1(EC_ZONES)]; /* whether spreads are known */
   double spreads[EC_AT_LEAST_1(EC_ZONES)][5];
@@ -103,6 +107,7 @@ typedef struct {
   bool ended;
   bool missing_taxels;
   bool missing_pose;
+  bool late; /* under way in the first frame */
   double onset_s;
   double age_s; /* of the last frame taken in */
   double touched_s; /* when it was last felt */
@@ -117,7 +122,7 @@ int ec_follow(
     const uint16_t *counts, const bool *valid, double t, const double *joints,
     uint32_t first_point, bool is_busy);
 bool ec_released(double touched_s, double now_s);
-void ec_close(uint32_t point);
+uint16_t ec_close(uint32_t point);
 
 /* samples.c: the values of each course at the sample times of a decision point, and those of the
    channels of kernels */
@@ -127,6 +132,11 @@ extern uint16_t ec_channels[EC_POINTS][EC_AT_LEAST_1(EC_CHANNELS)][EC_SAMPLES_OF
 void ec_samples_begin(void);
 void ec_samples_take(ec_row *row, uint32_t first_point);
 void ec_samples_close(uint32_t point, ec_row *row);
+
+/* doubts.c */
+void ec_doubts_begin(void);
+void ec_doubts_take(const ec_row *row);
+uint16_t ec_doubts(const ec_row *row, double window_s);
 
 /* features.c */
 void ec_vector_begin(void);
@@ -171,9 +181,9 @@ enum { EC_S_, EC_S_RATE, EC_S_MEAN, EC_S_DEVIATION, EC_S_ROUGHNESS };
 typedef struct {
   uint16_t samples;
   uint16_t rows; /* cells or joints */
-  uint32_t place; /* of the first in ec_values */
   uint8_t zone; /* index in ec_zone_names */
   uint8_t quantity;
+  uint32_t place; /* of the first in ec_values */
 } ec_course;
 
 typedef struct {
@@ -250,6 +260,7 @@ typedef struct {
   } places;
   uint16_t labels;
   uint16_t k;
+  const bool *excused; /* labels whose training trials had regions beside them; or NULL */
   const uint8_t *indices[2]; /* of a product: the factors' label of each label; or NULL */
   uint8_t factors[2];
 } ec_task;

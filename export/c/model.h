@@ -24,6 +24,8 @@
 /* a contact, and what is measured in its frames */
 #define EC_DEBOUNCE $debounce
 #define EC_WINDOW_S $window_s
+#define EC_LONG_STEPS $long_steps
+#define EC_LONG_STEP_S $long_step_s
 #define EC_ZONES ($zone_names_count - 1)
 #define EC_CELLS $cells
 #define EC_KERNEL_CELLS $kernel_cells
@@ -32,7 +34,7 @@
 #define EC_CENTROIDS $centroids
 #define EC_SPREADS $spreads
 #define EC_COURSES $courses_count
-#define EC_VALUES $values_count
+#define EC_VALUES $value_count
 #define EC_ZONE_CHANNELS $zone_channels
 #define EC_CHANNELS $channels
 

@@ -66,6 +66,7 @@ void ec_largest(
   component best = {0, 0, 0};
   uint16_t best_label = 0;
   uint16_t label = 0;
+  uint16_t beside = 0;
   uint32_t begin = TAXELS;
   uint32_t end = 0;
   for (uint32_t i = 0; i < TAXELS; i++) {
@@ -78,7 +79,10 @@ void ec_largest(
   for (uint32_t i = begin; i < end; i++) {
     if (!active[i] || labels[i]) continue;
     component next = flood(i, ++label, active, counts, previous);
-    if (is_before(next, best)) {
+    bool is_best = is_before(next, best);
+    uint16_t peak_beside = is_best ? best.peak : next.peak;
+    if (peak_beside > beside) beside = peak_beside;
+    if (is_best) {
       best = next;
       best_label = label;
     }
@@ -87,6 +91,7 @@ void ec_largest(
   region->end = end;
   region->area = best.area;
   region->peak = best.peak;
+  region->beside = beside > EC_ONSET;
   for (uint32_t i = 0; i < TAXELS; i++) region->taxels[i] = best.area && labels[i] == best_label;
 }
 

@@ -1,0 +1,94 @@
+/* Reasons to doubt the frames of a contact's window: edge/touch/doubts.py. */
+#include "internal.h"
+
+#define GAP_SHARE (1.0 / 24.0)
+#define GAP_S 0.05
+#define PERIODS 2.5
+#define FEWEST 4
+#define BESIDE_SHARE 0.2
+
+typedef struct {
+  double t; /* of the last frame */
+  double changed_s; /* when a frame last was unlike the one before it; below 0: never */
+  double repeated_s; /* the longest time since then */
+  double longest_s; /* from a frame to the next */
+  double long_steps[EC_LONG_STEPS]; /* shorter ones do not matter */
+  uint32_t longs;
+  uint32_t frames;
+  double felt_s;
+  uint32_t felt;
+  uint32_t beside;
+  uint32_t lifted; /* frames since */
+} history;
+
+static history past;
+
+static void step_to(history *h, double t) {
+  double step = t - h->t;
+  if (step > h->longest_s) h->longest_s = step;
+  if (step > EC_LONG_STEP_S && h->longs < EC_LONG_STEPS) h->long_steps[h->longs++] = step;
+}
+
+static void take(history *h, const ec_row *row) {
+  if (h->frames > 0) step_to(h, row->t);
+  h->frames++;
+  h->t = row->t;
+  if (!row->same || !row->area) h->changed_s = row->t;
+  if (h->changed_s >= 0.0 && row->t - h->changed_s > h->repeated_s) {
+    h->repeated_s = row->t - h->changed_s;
+  }
+}
+
+static void count(history *h, const ec_row *row) {
+  h->lifted = row->area ? 0 : h->lifted + 1;
+  if (!row->area) return;
+  h->felt_s = row->t;
+  h->felt++;
+  h->beside += row->beside;
+}
+
+void ec_doubts_begin(void) {
+  past = (history){0};
+  past.changed_s = -1.0;
+}
+
+/* Take in a frame that no later reading replaces. */
+void ec_doubts_take(const ec_row *row) {
+  take(&past, row);
+  count(&past, row);
+}
+
+/* The step that stands in the middle, of as many as there are frames; 0 of one too short to matter. */
+static double usual_step(history *h) {
+  uint32_t above = h->frames - 1 - h->frames / 2; /* how many are longer */
+  if (h->frames < FEWEST || above >= h->longs) return 0.0;
+  for (uint32_t i = 1; i < h->longs; i++) {
+    double step = h->long_steps[i];
+    uint32_t place = i;
+    for (; place > 0 && h->long_steps[place - 1] < step; place--) {
+      h->long_steps[place] = h->long_steps[place - 1];
+    }
+    h->long_steps[place] = step;
+  }
+  return h->long_steps[above];
+}
+
+/* The flags at the end of a window, with a frame that a later reading may still replace. */
+uint16_t ec_doubts(const ec_row *row, double window_s) {
+  static history h;
+  uint16_t flags = 0;
+  h = past;
+  if (row->t <= window_s) take(&h, row);
+  step_to(&h, row->t < window_s ? row->t : window_s);
+  if (h.changed_s < 0.0) h.repeated_s = h.t;
+  double pause_s = GAP_SHARE * window_s > GAP_S ? GAP_SHARE * window_s : GAP_S;
+  double usual_s = PERIODS * usual_step(&h);
+  if (h.longest_s > (usual_s > pause_s ? usual_s : pause_s)) flags |= EC_GAP;
+  if (h.repeated_s > (usual_s > 2.0 * pause_s ? usual_s : 2.0 * pause_s)) flags |= EC_FROZEN;
+  double before_s = past.felt_s;
+  h.lifted = past.lifted;
+  count(&h, row);
+  if (!row->area && ec_released(before_s, row->t)) h.felt += h.lifted;
+  if ((double)h.beside / h.felt >= BESIDE_SHARE) flags |= EC_SEVERAL;
+  return flags;
+}
