@@ -279,7 +279,13 @@ class Source:
         chain = self._info.chain
         for kind, axis, step, after in chain.links if chain else ():
             links.append([axis, np.ravel(step), after, f"EC_{kind.upper()}"])
+        joints = self._info.joints
+        limits = chain.limits if chain else [None] * joints
+        still_s = self._info.still_s or [inf] * joints
         self.values |= {
+            "limits": [
+                [*(i or (-inf, inf)), j] for i, j in zip(limits, still_s, strict=False)
+            ],
             "along": along,
             "around": around,
             "scale": float(layout.counts_per_newton or 1.0),
@@ -428,7 +434,7 @@ def literal(value: object) -> str:
     if not isinstance(value, float | np.floating):
         return str(int(value))  # type: ignore[call-overload]
     if np.isinf(value):
-        return "(double)INFINITY"
+        return f"{'-' if value < 0.0 else ''}(double)INFINITY"
     return float(value).hex()
 
 

@@ -6,11 +6,20 @@
 #define PERIODS 2.5
 #define FEWEST 4
 #define BESIDE_SHARE 0.2
+#define LIMIT_TOLERANCE 0.05
+
+/* The longest time for which something stays the same from frame to frame. */
+typedef struct {
+  double changed_s; /* when it last was unlike the frame before; below 0: never */
+  double longest_s;
+} run;
 
 typedef struct {
   double t; /* of the last frame */
-  double changed_s; /* when a frame last was unlike the one before it; below 0: never */
-  double repeated_s; /* the longest time since then */
+  run counts;
+  run joints[EC_AT_LEAST_1(EC_JOINTS)];
+  double angles[EC_AT_LEAST_1(EC_JOINTS)];
+  bool beyond; /* an angle was beyond its limits */
   double longest_s; /* from a frame to the next */
   double long_steps[EC_LONG_STEPS]; /* shorter ones do not matter */
   uint32_t longs;
@@ -29,13 +38,22 @@ static void step_to(history *h, double t) {
   if (step > EC_LONG_STEP_S && h->longs < EC_LONG_STEPS) h->long_steps[h->longs++] = step;
 }
 
+static void run_to(run *r, double t, bool changed) {
+  if (changed) r->changed_s = t;
+  if (r->changed_s >= 0.0 && t - r->changed_s > r->longest_s) r->longest_s = t - r->changed_s;
+}
+
 static void take(history *h, const ec_row *row) {
   if (h->frames > 0) step_to(h, row->t);
   h->frames++;
   h->t = row->t;
-  if (!row->same || !row->area) h->changed_s = row->t;
-  if (h->changed_s >= 0.0 && row->t - h->changed_s > h->repeated_s) {
-    h->repeated_s = row->t - h->changed_s;
+  run_to(&h->counts, row->t, !row->same || !row->area);
+  for (uint32_t i = EC_JOINTS; i-- > 0;) {
+    double angle = row->joints[i];
+    run_to(&h->joints[i], row->t, angle != h->angles[i]);
+    h->angles[i] = angle;
+    if (angle < ec_limits[i].low - LIMIT_TOLERANCE) h->beyond = true;
+    if (angle > ec_limits[i].high + LIMIT_TOLERANCE) h->beyond = true;
   }
 }
 
@@ -49,7 +67,8 @@ static void count(history *h, const ec_row *row) {
 
 void ec_doubts_begin(void) {
   past = (history){0};
-  past.changed_s = -1.0;
+  past.counts.changed_s = -1.0;
+  for (uint32_t i = EC_JOINTS; i-- > 0;) past.angles[i] = EC_NAN;
 }
 
 /* Take in a frame that no later reading replaces. */
@@ -80,11 +99,15 @@ uint16_t ec_doubts(const ec_row *row, double window_s) {
   h = past;
   if (row->t <= window_s) take(&h, row);
   step_to(&h, row->t < window_s ? row->t : window_s);
-  if (h.changed_s < 0.0) h.repeated_s = h.t;
+  if (h.counts.changed_s < 0.0) h.counts.longest_s = h.t;
   double pause_s = GAP_SHARE * window_s > GAP_S ? GAP_SHARE * window_s : GAP_S;
   double usual_s = PERIODS * usual_step(&h);
   if (h.longest_s > (usual_s > pause_s ? usual_s : pause_s)) flags |= EC_GAP;
-  if (h.repeated_s > (usual_s > 2.0 * pause_s ? usual_s : 2.0 * pause_s)) flags |= EC_FROZEN;
+  for (uint32_t i = EC_JOINTS; i-- > 0;) {
+    if (h.joints[i].longest_s > ec_limits[i].still_s + pause_s) flags |= EC_STILL_JOINTS;
+  }
+  if (h.beyond) flags |= EC_JOINT_LIMITS;
+  if (h.counts.longest_s > (usual_s > 2.0 * pause_s ? usual_s : 2.0 * pause_s)) flags |= EC_FROZEN;
   double before_s = past.felt_s;
   h.lifted = past.lifted;
   count(&h, row);

@@ -33,7 +33,9 @@ enum {
   EC_GAP = 1024,
   EC_FROZEN = 2048,
   EC_SEVERAL = 4096,
-  EC_LATE = 8192
+  EC_LATE = 8192,
+  EC_STILL_JOINTS = 16384,
+  EC_JOINT_LIMITS = 32768
 };
 
 typedef struct {

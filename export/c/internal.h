@@ -157,6 +157,14 @@ typedef struct {
   uint8_t kind;
 } ec_link;
 
+/* Of a joint that features are made of. */
+typedef struct {
+  double low;
+  double high;
+  double still_s; /* how long an angle stayed the same in training */
+} ec_limit;
+
+extern const ec_limit ec_limits[];
 extern const ec_angle ec_angles[];
 extern const ec_link ec_links[];
 extern const bool ec_alive[];

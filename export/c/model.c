@@ -3,6 +3,7 @@
 
 const bool ec_alive[] = $alive;
 const ec_angle ec_angles[] = $angles;
+const ec_limit ec_limits[] = $limits;
 const ec_link ec_links[] = $links;
 
 const uint8_t ec_zone_names[] = $zone_names;

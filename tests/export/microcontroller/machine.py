@@ -32,7 +32,7 @@ BOARDS = {
 has no board with a Cortex-M0+ of enough memory; its code runs on a Cortex-M3."""
 FLAGS = (
     "short missing_taxels missing_pose as_trained out_of_range unusual unknown tie unsure "
-    "uncertified gap frozen several late".split()
+    "uncertified gap frozen several late still_joints joint_limits".split()
 )
 """In the order of their bits in C."""
 FIELDS = 10
