@@ -31,7 +31,7 @@ from edge.writing import write_whole
 from export.c_graph import CompiledGraph, Step
 
 ROOMS = Path(__file__).parent / "c"
-CODE_BYTES = 26 * 1024
+CODE_BYTES = 28 * 1024
 """Of all rooms, with small tables and the arithmetic of doubles, by gcc 12 with -O2 for a
 Cortex-M0+."""
 KERNEL_BYTES = 4608
@@ -47,7 +47,7 @@ COSTS = {
 """Instructions of a Cortex-M4F and of a Cortex-M0+ for the parts of a decision, fitted
 to what QEMU counted: roots and logarithms of values, rows of projections, products of
 matrices, and numbers that other steps of the graph take."""
-REST_OF_RAM = 2048 + 3100
+REST_OF_RAM = 2048 + 2100
 """Of the stack, and of what does not depend on the model."""
 LONG_STEP_S = 0.95 * GAP_S / PERIODS
 """No usual step of at most this time makes a longer pause usual."""
@@ -280,12 +280,11 @@ class Source:
         for kind, axis, step, after in chain.links if chain else ():
             links.append([axis, np.ravel(step), after, f"EC_{kind.upper()}"])
         joints = self._info.joints
-        limits = chain.limits if chain else [None] * joints
-        still_s = self._info.still_s or [inf] * joints
+        ranges = [*(chain.limits if chain else ()), *[None] * joints]
+        still_s = [*self._info.still_s, *[inf] * joints]
+        limits = list(zip(ranges, still_s, strict=False))[:joints]
         self.values |= {
-            "limits": [
-                [*(i or (-inf, inf)), j] for i, j in zip(limits, still_s, strict=False)
-            ],
+            "limits": [[*(span or (-inf, inf)), still] for span, still in limits],
             "along": along,
             "around": around,
             "scale": float(layout.counts_per_newton or 1.0),
