@@ -3,42 +3,64 @@
 
 from __future__ import annotations
 
+import math
 import os
 import re
 import string
 from collections.abc import Iterable, Mapping, Sized
 from contextlib import ExitStack
-from math import ceil, inf, prod
+from math import inf
 from pathlib import Path
 
 import numpy as np
 
-from edge.arrays import Array
+from edge.arrays import Array, Floats
 from edge.early import stopping_rules
+from edge.elementary import log, logistic, sin
 from edge.errors import InputError
 from edge.model.info import ModelInfo, Novelty, Remoteness, StoppingRule
 from edge.model.model import Model
 from edge.touch import measures, transforms
 from edge.touch.cells import KERNEL_CELLS, Cells
 from edge.touch.contact import feature_types
-from edge.touch.kernels import BIASES, KernelTable, mixes
+from edge.touch.doubts import GAP_S, PERIODS
+from edge.touch.kernels import BIASES, CONVOLUTIONS, KernelTable, mixes
 from edge.touch.layout import SkinLayout
 from edge.touch.zones import Zones
 from edge.writing import write_whole
-from export.c_graph import CompiledGraph
+from export.c_graph import CompiledGraph, Step
 
 ROOMS = Path(__file__).parent / "c"
-RATE_HZ = 120.0
-"""Frames a second for which there is room."""
 CODE_BYTES = 28 * 1024
 """Of all rooms, with small tables and the arithmetic of doubles, by gcc 12 with -O2 for a
 Cortex-M0+."""
+KERNEL_BYTES = 4608
+"""Of the code of kernels, and of the channels that each sums up."""
+COSTS = {
+    "task": (14000, 27000),
+    "convolution": (6600, 8900),
+    "root": (1340, 3100),
+    "row": (704, 1365),
+    "product": (12.8, 49.3),
+    "number": (301, 776),
+}
+"""Instructions of a Cortex-M4F and of a Cortex-M0+ for the parts of a decision, fitted
+to what QEMU counted: roots and logarithms of values, rows of projections, products of
+matrices, and numbers that other steps of the graph take."""
+REST_OF_RAM = 2048 + 2100
+"""Of the stack, and of what does not depend on the model."""
+LONG_STEP_S = 0.95 * GAP_S / PERIODS
+"""No usual step of at most this time makes a longer pause usual."""
 LARGEST = 2**63
 """No product of a frame's sums may reach it."""
 MOST_SUMMED = 128
 """Samples beyond which numpy sums up in halves."""
 ALONE = {*measures.ALONE.values(), ("contact", "area")} - {("skin", "stiffness")}
 """(zone, quantity) that need no sums of a zone."""
+TYPE_OF = {"palette": "uint8", "packed": "uint8"}
+"""The types of tables that are no types of C."""
+PROBE = 0.3
+PROBES = 8
 DOUBTS = ("novelty", "remoteness")
 FLAGS = ("out_of_range", *DOUBTS)
 """Outputs of the model that are of no task."""
@@ -89,13 +111,12 @@ def export(
             "--flash; export fewer features or recordings"
         )
     source.write(Path(folder))
-    millions = source.work / 1e6
+    fast, slow = source.instructions() / 1e6
     return (
         f"{os.fspath(folder)}: {source.flash / 1024:.0f} kB of flash, "
-        f"{source.ram / 1024:.0f} kB of RAM, a decision in about {millions:.1f} million "
-        f"instructions of a Cortex-M4F ({millions / 0.064:.0f} ms at 64 MHz) or "
-        f"{2.2 * millions:.1f} million of a Cortex-M0+ ({2.2 * millions / 0.133:.0f} ms "
-        f"at 133 MHz){left_out}"
+        f"{source.ram / 1024:.0f} kB of RAM, a decision in about {fast:.1f} million "
+        f"instructions of a Cortex-M4F ({fast / 0.064:.0f} ms at 64 MHz) or "
+        f"{slow:.1f} million of a Cortex-M0+ ({slow / 0.133:.0f} ms at 133 MHz){left_out}"
     )
 
 
@@ -106,7 +127,7 @@ class Source:
         values: what stands for the names in the rooms' `model.h` and `model.c`.
         flash: bytes of code and tables.
         ram: bytes.
-        work: instructions of a decision on a Cortex-M4F, about.
+        work: of a decision, how much there is of each of `COSTS`.
     """
 
     def __init__(
@@ -127,18 +148,22 @@ class Source:
         self._info = model.info
         self._layout = model.info.layout
         self._types = feature_types(model.info.features)
-        self._frames = ceil(model.info.window_s * RATE_HZ) + 4
         windows_s = model.decision_points_s
         self._last = len(windows_s) if error is not None else 1
+        self._zones = Zones(self._layout, self._types).names
         self.values: dict[str, object] = {
             "early": error is not None,
             "windows_s": windows_s[-self._last :],
+            "long_step_s": LONG_STEP_S,
+            "repeats": int(model.info.repeats),
+            "long_steps": int(model.info.window_s / LONG_STEP_S) + 2,
         }
         for owner, names in ((self._layout, OF_LAYOUT), (self._info, OF_INFO)):
             self.values |= {name: getattr(owner, name) or 0 for name in names}
         self.flash = CODE_BYTES
-        self.ram = 4096
-        self.work = 2500 * self._info.width
+        self.ram = 0
+        self.work: dict[str, float] = dict.fromkeys(COSTS, 0.0)
+        self.work["task"] += len(model.info.tasks)
         outputs = set(model.outputs) - set(() if doubts else DOUBTS)
         points = range(len(windows_s))[-self._last :]
         room = self._info.width + self._features()
@@ -149,6 +174,12 @@ class Source:
         rules = {} if error is None else stopping_rules(model, error)
         self._tasks(graph.places, rules)
         self._limits(doubts)
+        self.values["checksum"] = str(checksum(model) if graph.steps else 0)
+
+    def instructions(self) -> Floats:
+        """(2,) about how many a decision takes on each processor of `COSTS`."""
+        amounts = np.array(list(self.work.values()))
+        return np.asarray(amounts @ np.array(list(COSTS.values())))
 
     def write(self, folder: Path) -> None:
         """Write all files, whole or not at all."""
@@ -165,58 +196,78 @@ class Source:
                 file.flush()
 
     def _features(self) -> int:
-        """The `ec_feature` of each feature, and the tables of the kernels, from which
-        some are computed; how many doubles they are measured in."""
+        """The `ec_course` and the `ec_feature` of each feature, and the tables of the
+        kernels, from which some are computed; how many doubles summaries take."""
+        courses: dict[tuple[object, ...], int] = {}
+        places = [0]
         rows = []
-        largest = 0
+        summed = 0
         for feature, width in zip(self._types, self._info.widths, strict=True):
-            samples = feature.kernels or feature.samples or self._info.samples
-            count = width // samples
-            if feature.summary not in ("", "rate"):
-                count = width
-                largest = max(largest, count * samples)
+            samples = feature.samples or self._info.samples
+            sums_up = feature.summary not in ("", "rate")
+            count = width if sums_up else width // samples
             alone = (feature.zone, feature.quantity) in ALONE
             of_region = "REGION_" * (alone and feature.zone == "contact")
+            quantity = f"EC_Q_{of_region}{feature.quantity.upper()}"
+            zone = 0 if alone else self._zones.index(feature.zone)
+            course = samples, count, zone, quantity.replace("CHANGE", "ANGLE")
+            if feature.kernels:
+                self.work["convolution"] += CONVOLUTIONS
+            elif course not in courses:
+                courses[course] = len(courses)
+                places.append(places[-1] + samples * count)
+            if sums_up:
+                together = count if "relative" in feature.transforms else 1
+                summed = max(summed, samples * together)
+            roots = {"log", "sqrt"}.intersection(feature.transforms)
+            self.work["root"] += (samples * count * len(roots)) * (not feature.kernels)
             row = [
                 transforms.floor_of(feature, self._layout),
-                samples,
-                count,
-                "EC_NO_ZONE" if alone else f"EC_{feature.zone.upper()}",
-                f"EC_Q_{of_region}{feature.quantity.upper()}",
+                courses.get(course, 0),
+                quantity,
                 [f"EC_T_{kind.upper()}" for kind in feature.transforms],
                 f"EC_S_{feature.summary.upper()}",
             ]
             rows.append(row)
-        self.values["features"] = rows
+        fields = [[*c, place] for c, place in zip(courses, places, strict=False)]
+        self.values |= {"features": rows, "courses": fields, "value_count": places[-1]}
+        self.ram += self._last * 8 * places[-1]
         for name in ("taxel_kernels", "zone_kernels"):
             table = self._info.kernels.get(name, KernelTable((), ()))
             self.values[name] = kernel_fields(table)
-        return largest + (len(measures.QUANTITIES) + 4) * self._frames
+            if table.shifts:
+                self.flash += KERNEL_BYTES + 4 * len(table.biases)
+        return summed
 
     def _skin(self) -> None:
         """The skin, and what is measured in every frame."""
         layout = self._layout
         quantities = {feature.quantity for feature in self._types}
-        zones = Zones(layout, self._types).names
         cells = Cells(layout)
         kernel_cells = Cells(layout, KERNEL_CELLS)
         pooled = cells.count * ("taxel_force" in quantities)
         pooled_for_kernels = kernel_cells.count * ("taxel_kernels" in quantities)
-        spreads = not quantities.isdisjoint(measures.QUANTITIES[6:])
-        row = 72 + 64 * max(len(zones), 1) + 8 * self._info.joints
-        row += 4 * (pooled + pooled_for_kernels)
-        self.ram += self._frames * row + 8 * layout.alive.size
-        self.work += (12000 if spreads else 4000) * self._frames * len(zones)
+        zone_channels = 8 * len(self._zones) * ("zone_kernels" in quantities)
+        zones = max(len(self._zones), 1)
+        unsure = 2 * len(self._zones) + 3 + self._info.joints
+        row = 40 + 8 * max(self._info.joints, 1) + 121 * zones + 8 * unsure
+        row += 4 * max(pooled, 1) + 4 * max(pooled_for_kernels, 1)
+        self.ram += 4 * row + 48 * unsure + 9 * layout.alive.size
+        self.ram += self._last * 240 * (zone_channels + pooled_for_kernels)
         self.values |= {
-            "frames": self._frames,
             "cells": pooled,
             "kernel_cells": pooled_for_kernels,
+            "zone_channels": zone_channels,
+            "channels": zone_channels + pooled_for_kernels,
             "motion": "motion" in quantities,
-            "spreads": spreads,
+            "centroids": not quantities.isdisjoint(("along", "around")),
+            "spreads": not quantities.isdisjoint(measures.QUANTITIES[6:]),
             "force_motion": not quantities.isdisjoint(("force_motion", "stiffness")),
-            "zone_names": [f"EC_{name.upper()}" for name in (*zones, "no_zone")],
-            "cell_of_taxel": _of_taxels(layout, cells),
-            "kernel_cell_of_taxel": _of_taxels(layout, kernel_cells),
+            "zone_names": [f"EC_{name.upper()}" for name in (*self._zones, "no_zone")],
+            "cell_of_taxel": _of_taxels(layout, cells) if pooled else (),
+            "kernel_cell_of_taxel": (
+                _of_taxels(layout, kernel_cells) if pooled_for_kernels else ()
+            ),
         }
 
     def _geometry(self) -> None:
@@ -229,7 +280,12 @@ class Source:
         chain = self._info.chain
         for kind, axis, step, after in chain.links if chain else ():
             links.append([axis, np.ravel(step), after, f"EC_{kind.upper()}"])
+        joints = self._info.joints
+        ranges = [*(chain.limits if chain else ()), *[None] * joints]
+        still_s = [*self._info.still_s, *[inf] * joints]
+        limits = list(zip(ranges, still_s, strict=False))[:joints]
         self.values |= {
+            "limits": [[*(span or (-inf, inf)), still] for span, still in limits],
             "along": along,
             "around": around,
             "scale": float(layout.counts_per_newton or 1.0),
@@ -245,22 +301,42 @@ class Source:
         """The steps and the tables of the graph."""
         tables = []
         for table in graph.tables:
-            kind = table.dtype.name
-            values = array(f"{kind}_t", table.reshape(-1))
-            stride = (table.ndim - 1) * table.shape[-1]
-            tables.append([values, stride, f"EC_{kind.upper()}"])
+            kind = TYPE_OF.get(table.type, table.type)
+            values = array(f"{kind}_t", table.data.reshape(-1))
+            palette = array("double", table.palette) if table.palette.size else 0
+            stride = (table.data.ndim - 1) * table.data.shape[-1]
+            code = f"EC_{table.type.upper()}"
+            tables.append([values, palette, stride, table.columns, code, table.shift])
             self.flash += table.nbytes
+        steps = []
         for step in graph.steps:
-            is_product = step.operator in ("EC_GEMM", "EC_MATMUL")
-            self.work += 16 * prod(step.sizes) if is_product else 400 * max(step.sizes)
-        self.flash += 40 * len(graph.steps)
-        self.ram += 8 * graph.arena
+            self._weigh(step, graph)
+            steps.append([step.inputs, step.outputs, step.sizes, step.operator])
+        most_columns = max((table.columns for table in graph.tables), default=0)
+        self.flash += 26 * len(graph.steps) + 20 * len(graph.tables)
+        self.ram += 8 * (graph.arena + most_columns) + REST_OF_RAM
         self.values |= {
             "arena": graph.arena,
             "ram": self.ram,
             "tables": tables,
-            "steps": graph.steps,
+            "steps": steps,
+            "most_columns": most_columns,
         }
+
+    def _weigh(self, step: Step, graph: CompiledGraph) -> None:
+        """Count the work of a step."""
+        size, along, behind, count = [*step.sizes, 1, 1, 1][:4]
+        if step.operator == "EC_PROJECT":
+            self.work["row"] += along
+            count = graph.tables[step.inputs[3] - graph.arena].columns
+        if step.operator in ("EC_PROJECT", "EC_GEMM", "EC_MATMUL"):
+            self.work["product"] += along * count
+        elif step.operator.startswith(("EC_REDUCE", "EC_TOPK")):
+            self.work["number"] += size * along * behind
+        elif step.operator.startswith("EC_GATHER"):
+            self.work["number"] += size * behind * count
+        else:
+            self.work["number"] += size
 
     def _tasks(
         self, places: Mapping[str, int], rules: Mapping[str, StoppingRule | None]
@@ -327,6 +403,22 @@ class Source:
         self.values |= {"naming": naming, "calibrated": info.novelty is not None}
 
 
+def checksum(model: Model) -> int:
+    """What `ec_selftest` in `export/c/decide.c` compares: FNV-1a of elementary functions
+    and of the outputs for features that are all `PROBE`, at the full window."""
+    last = max(len(model.decision_points_s) - 1, 0)
+    values = model.run(np.full((1, model.info.width), PROBE), last)
+    ends = ENDS[:3]
+    names = [f"{task}_{end}" for task in model.info.tasks for end in ends]
+    numbers = [PROBE * i for i in range(1, PROBES + 1)]
+    probes = [f(x) for x in numbers for f in (sin, log, logistic, math.sqrt)]
+    parts = [np.array(probes), *(values[name].reshape(-1) for name in names)]
+    total = 14695981039346656037
+    for bits in np.concatenate(parts).astype(np.float64).view(np.uint64).tolist():
+        total = (total ^ bits) * 1099511628211 % 2**64
+    return total
+
+
 def literal(value: object) -> str:
     """A value in C: hexadecimal floats hold every bit."""
     if isinstance(value, str):
@@ -336,7 +428,7 @@ def literal(value: object) -> str:
     if not isinstance(value, float | np.floating):
         return str(int(value))  # type: ignore[call-overload]
     if np.isinf(value):
-        return "(double)INFINITY"
+        return f"{'-' if value < 0.0 else ''}(double)INFINITY"
     return float(value).hex()
 
 

@@ -25,6 +25,7 @@ struct Stream {
   uint8_t endTransmission(bool stop = true);
   size_t requestFrom(uint8_t address, uint8_t size);
   size_t print(const char*);
+  size_t println(const char*);
   size_t println(double, int digits);
   int available();
   int read();

@@ -6,6 +6,10 @@
 #include <stdbool.h>
 #include <stdint.h>
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 typedef struct {
   int32_t now; /* in 1/4096 counts */
   int32_t low;
@@ -25,5 +29,9 @@ void ec_baseline_above(
    while nothing touches, which ec_is_touched says. */
 void ec_baseline_follow(
     ec_baseline *taxels, uint32_t n, const uint16_t *raw, const bool *valid, int32_t step);
+
+#ifdef __cplusplus
+}
+#endif
 
 #endif

@@ -7,7 +7,9 @@
 #define RADIANS 0.017453292519943295 /* of a degree */
 
 ec_contact ec_now; /* the contact that is followed */
-ec_row ec_rows[EC_FRAMES];
+static ec_row newest; /* a later reading of its instant may still replace it */
+static double settled_motions[2]; /* of the frame before it */
+static uint16_t before[TAXELS]; /* the counts of the last row */
 static ec_set active;
 static ec_region region;
 
@@ -17,7 +19,7 @@ bool ec_released(double touched_s, double now_s) {
 
 /* A point of the skin in the frame of its link. */
 static void skin_point(double row, double col, double point[3]) {
-  double angle = TURN * col / EC_COLS;
+  double angle;
   point[0] = col * EC_AROUND;
   point[1] = row * EC_ALONG;
   point[2] = 0.0;
@@ -26,6 +28,8 @@ static void skin_point(double row, double col, double point[3]) {
     uint32_t column = (uint32_t)col;
     const ec_angle *place = &ec_angles[column % EC_COLS];
     angle = (place->angle_deg + (col - column) * place->step_deg) * RADIANS;
+  } else {
+    angle = TURN * col / EC_COLS;
   }
   point[0] = EC_RADIUS_M * ec_cos(angle);
   point[1] = EC_RADIUS_M * ec_sin(angle);
@@ -77,8 +81,8 @@ static double distance(ec_start *start, const int64_t *sums, const double *joint
     return EC_NAN;
   }
   if (EC_LINKS) carried(joints, p);
-  if (!start->known) {
-    start->known = true;
+  if (!start->is_known) {
+    start->is_known = true;
     for (uint32_t i = 0; i < 3; i++) start->point[i] = p[i];
   }
   double x = p[0] - start->point[0];
@@ -88,21 +92,23 @@ static double distance(ec_start *start, const int64_t *sums, const double *joint
 }
 
 /* Of two readings of one instant the later one counts. */
-static void forget_last(void) {
-  ec_now.rows--;
+static void forget_newest(void) {
+  for (uint32_t i = 0; i < 2; i++) ec_now.starts[i].is_known = ec_now.starts[i].is_settled;
+}
+
+static void settle_newest(uint32_t first_point) {
   for (uint32_t i = 0; i < 2; i++) {
-    ec_now.starts[i].known = false;
-    for (uint32_t j = 0; j < ec_now.rows; j++) {
-      double motion = ec_rows[j].motions[i];
-      if (motion == motion) ec_now.starts[i].known = true;
-    }
+    settled_motions[i] = newest.motions[i];
+    if (newest.motions[i] == newest.motions[i]) ec_now.starts[i].is_settled = true;
   }
+  ec_samples_take(&newest, first_point);
+  ec_doubts_take(&newest);
 }
 
 static void move(ec_row *row, const double *joints) {
   bool touched = region.area > 0;
   for (uint32_t i = 0; i < 2; i++) {
-    row->motions[i] = !touched && ec_now.rows ? ec_rows[ec_now.rows - 1].motions[i] : 0.0;
+    row->motions[i] = touched ? 0.0 : settled_motions[i];
   }
   if (touched && EC_MOTION) {
     int64_t taxels[EC_ZONE_WIDTH];
@@ -125,46 +131,57 @@ static void pool(
   }
 }
 
-static int add(const uint16_t *counts, const bool *valid, const double *joints, double age_s) {
-  if (ec_now.rows && age_s <= ec_now.age_s) {
+static void add(
+    const uint16_t *counts, const bool *valid, const double *joints, double age_s,
+    uint32_t first_point) {
+  if (ec_now.has_row && age_s <= ec_now.age_s) {
     age_s = ec_now.age_s;
-    forget_last();
+    forget_newest();
+  } else if (ec_now.has_row) {
+    settle_newest(first_point);
   }
-  if (ec_now.rows == EC_FRAMES) return EC_TOO_FAST;
   for (uint32_t i = 0; valid && i < TAXELS; i++) {
     if (!valid[i] && ec_alive[i]) ec_now.missing_taxels = true;
   }
-  ec_row *row = &ec_rows[ec_now.rows];
-  row->t = age_s;
-  row->peak = region.peak;
-  row->area = region.area;
+  newest.same = ec_now.has_row;
+  for (uint32_t i = 0; i < TAXELS; i++) {
+    if (counts[i] != before[i]) newest.same = false;
+    before[i] = counts[i];
+  }
+  newest.t = age_s;
+  newest.peak = region.peak;
+  newest.area = region.area;
   if (region.area) ec_now.region = region;
   for (uint32_t i = 0; ec_zone_names[i] != EC_NO_ZONE; i++) {
-    ec_zone((ec_zone_name)ec_zone_names[i], active, &region, counts, row->zones[i]);
+    ec_zone((ec_zone_name)ec_zone_names[i], active, &region, counts, newest.zones[i]);
   }
-  move(row, joints);
-  if (EC_CELLS) pool(counts, valid, ec_cell_of_taxel, row->cells, EC_CELLS);
+  move(&newest, joints);
+  if (EC_CELLS) pool(counts, valid, ec_cell_of_taxel, newest.cells, EC_CELLS);
   if (EC_KERNEL_CELLS) {
-    pool(counts, valid, ec_kernel_cell_of_taxel, row->kernel_cells, EC_KERNEL_CELLS);
+    pool(counts, valid, ec_kernel_cell_of_taxel, newest.kernel_cells, EC_KERNEL_CELLS);
   }
-  for (uint32_t i = EC_JOINTS; i-- > 0;) row->joints[i] = joints ? joints[i] : EC_NAN;
+  for (uint32_t i = EC_JOINTS; i-- > 0;) newest.joints[i] = joints ? joints[i] : EC_NAN;
   if (EC_JOINTS && !joints) ec_now.missing_pose = true;
-  ec_now.rows++;
+  ec_now.has_row = true;
   ec_now.age_s = age_s;
-  return 0;
 }
 
-/* Take a frame into the contact, and end it where it is over. */
-int ec_follow(const uint16_t *counts, const bool *valid, double t, const double *joints) {
-  int error = 0;
+/* Take a frame into the contact, and end it where it is over. The decision points before first_point
+   are closed; a contact does not begin while the last one is still being measured. */
+int ec_follow(
+    const uint16_t *counts, const bool *valid, double t, const double *joints,
+    uint32_t first_point, bool is_busy) {
   if (ec_now.ended) ec_now = (ec_contact){0};
   ec_largest(counts, valid, ec_now.region.taxels, active, &region);
   bool touched = region.area > 0;
   bool above = region.peak > EC_ONSET;
   if (!ec_now.under_way) {
     if (!above) return 0;
+    if (is_busy) return EC_BUSY;
     ec_now.under_way = true;
     ec_now.onset_s = t;
+    ec_samples_begin();
+    ec_doubts_begin();
   }
   double age_s = t - ec_now.onset_s;
   bool confirmed = ec_now.frames >= EC_DEBOUNCE;
@@ -176,12 +193,22 @@ int ec_follow(const uint16_t *counts, const bool *valid, double t, const double 
   /* A reading without contact replaces none of its instant. */
   bool is_new = touched || age_s > ec_now.age_s;
   if (is_new && (!confirmed || ec_now.age_s < EC_WINDOW_S)) {
-    error = add(counts, valid, joints, age_s);
+    add(counts, valid, joints, age_s, first_point);
   }
   if (touched) {
     ec_now.touched_s = age_s;
   } else if (ec_released(ec_now.touched_s, age_s)) {
     ec_now.ended = true;
   }
-  return error;
+  return 0;
+}
+
+/* The frames so far are all that count for a decision point; returns reasons to doubt them. */
+uint16_t ec_close(uint32_t point) {
+  ec_samples_close(point, &newest);
+  uint16_t doubts = ec_doubts(&newest, ec_windows_s[point]);
+  if (ec_now.missing_taxels) doubts |= EC_MISSING_TAXELS;
+  if (ec_now.missing_pose) doubts |= EC_MISSING_POSE;
+  if (ec_now.late) doubts |= EC_LATE;
+  return doubts;
 }

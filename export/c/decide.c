@@ -2,12 +2,26 @@
    agreement.py. */
 #include "internal.h"
 
+/* A decision point whose frames have all come. */
+typedef struct {
+  double t_s;
+  double onset_s;
+  uint32_t point;
+  uint16_t doubts;
+  bool is_first; /* of its contact */
+} ec_question;
+
+static ec_question questions[EC_POINTS]; /* of the last contact */
+static uint32_t due;                     /* how many of them there are */
+static uint32_t asked;                   /* and how many have been taken up */
+static ec_question question;             /* the one that is worked at */
+static enum { IDLE, MEASURING, COMPUTING } phase;
+
 static ec_event answers[EC_TASKS]; /* that of a decided task stays */
 static int16_t agreed[EC_TASKS];   /* the labels in which the tasks agree; -1: refused */
 static double distances[EC_TASKS][EC_MOST_LABELS];
 static bool decided[EC_TASKS];
 static uint32_t waiting; /* tasks */
-static uint32_t point;   /* the next decision point */
 static bool announced;   /* whether the onset was */
 static double last_s;
 
@@ -34,7 +48,7 @@ static double margin(uint32_t index) {
 }
 
 static double excess(void) {
-  double typical = ec_typical[point];
+  double typical = ec_typical[question.point];
   double score = ec_arena[EC_PLACE_NOVELTY];
   return score > typical && typical > 0.0 ? ec_log(score / typical) : 0.0;
 }
@@ -43,7 +57,7 @@ static double excess(void) {
 static double known(void) {
   double score = ec_arena[EC_PLACE_REMOTENESS];
   if (score <= 0.0) return 1.0;
-  return ec_logistic(ec_slopes[point] * ec_log(ec_middles[point] / score));
+  return ec_logistic(ec_slopes[question.point] * ec_log(ec_middles[question.point] / score));
 }
 
 /* The calibrated confidence of a task's label by a curve. */
@@ -84,10 +98,11 @@ static void withhold(ec_event *a) {
 static uint16_t flag(bool holds, uint16_t bit) { return holds ? bit : 0; }
 
 /* The model's answer to a task, with the reasons to doubt it. */
-static void ask(uint32_t index, bool refused, uint16_t doubts) {
+static void ask(uint32_t index, bool refused) {
   const ec_task *task = &ec_tasks[index];
-  ec_event answer = {EC_DECIDED_EVENT, ec_now.onset_s, ec_windows_s[point], 0.0, 0, -1, doubts,
-                     (uint8_t)index, EC_NOTHING};
+  double window_s = ec_windows_s[question.point];
+  ec_event answer = {EC_DECIDED_EVENT, question.t_s, question.onset_s, window_s, 0.0, 0, -1,
+                     question.doubts, (uint8_t)index, EC_NOTHING};
   ec_event *a = &answers[index];
   *a = answer;
   a->flags |= flag(refused || ec_arena[EC_PLACE_OUT_OF_RANGE] > 0.0, EC_OUT_OF_RANGE);
@@ -105,21 +120,16 @@ static void ask(uint32_t index, bool refused, uint16_t doubts) {
   a->flags |= flag(ties > 1, EC_TIE);
   a->confidence = EC_NAN;
   if (!EC_CALIBRATED) return;
-  double likely = confidence(&task->curves[point], index);
+  double likely = confidence(&task->curves[question.point], index);
   if (index == EC_NAMING) likely *= known();
   a->confidence = rounded(likely);
-  a->flags |= flag(ec_arena[EC_PLACE_NOVELTY] > ec_novel[point], EC_UNUSUAL);
-  if (index == EC_NAMING && ec_arena[EC_PLACE_REMOTENESS] > ec_remote[point]) withhold(a);
+  a->flags |= flag(ec_arena[EC_PLACE_NOVELTY] > ec_novel[question.point], EC_UNUSUAL);
+  if (index == EC_NAMING && ec_arena[EC_PLACE_REMOTENESS] > ec_remote[question.point]) withhold(a);
 }
 
 /* The model's answers at the decision point to the tasks that wait; whether it refuses. */
-static bool ask_all(bool is_short) {
-  uint16_t doubts = flag(is_short, EC_SHORT);
-  doubts |= flag(ec_now.missing_taxels, EC_MISSING_TAXELS);
-  doubts |= flag(ec_now.missing_pose, EC_MISSING_POSE);
+static bool ask_all(void) {
   bool refused = false;
-  ec_vector(ec_windows_s[point]);
-  ec_graph(point);
   for (uint32_t i = 0; i < EC_TASKS; i++) {
     const ec_task *task = &ec_tasks[i];
     agreed[i] = (int16_t)ec_arena[task->places.label];
@@ -132,7 +142,7 @@ static bool ask_all(bool is_short) {
     if (ec_tasks[i].indices[0]) agree(i);
   }
   for (uint32_t i = 0; i < EC_TASKS; i++) {
-    if (!decided[i]) ask(i, refused, doubts);
+    if (!decided[i]) ask(i, refused);
   }
   return refused;
 }
@@ -166,26 +176,26 @@ static bool stop_product(const ec_task *task, ec_event *a) {
 
 /* Whether a task is decided at the decision point, by the rule certified for the error rate. */
 static bool is_decided(uint32_t index) {
+  if (!EC_EARLY) return true;
   const ec_task *task = &ec_tasks[index];
   ec_event *a = &answers[index];
-  if (!EC_EARLY) return true;
   if (!task->has_rule) {
     a->flags |= EC_UNCERTIFIED;
-    if (point != EC_POINTS - 1) return false;
+    if (question.point != EC_POINTS - 1) return false;
   }
   if (task->indices[0]) return stop_product(task, a);
   if (!task->has_rule) return true;
   bool waits = a->flags & EC_UNUSUAL;
   bool sure = confidence(&task->rule_curve, index) >= task->rule_confidence;
   uint32_t last = waits ? EC_POINTS - 1 : task->rule_last;
-  if (point < last && (waits || !sure)) return false;
+  if (question.point < last && (waits || !sure)) return false;
   return stop(a, task, sure);
 }
 
 /* Ask at the decision point; the number of events. Factors come before their products. */
-static int decide(ec_event *events, bool is_short) {
+static int decide(ec_event *events) {
   int count = 0;
-  bool refused = ask_all(is_short);
+  bool refused = ask_all();
   for (uint32_t turn = 0; turn < 2 * EC_TASKS; turn++) {
     uint32_t i = turn % EC_TASKS;
     bool is_product = ec_tasks[i].indices[0] != 0;
@@ -198,49 +208,117 @@ static int decide(ec_event *events, bool is_short) {
   return count;
 }
 
+/* FNV-1a, of whole doubles. */
+static void take_in(uint64_t *sum, const double *values, uint32_t n) {
+  for (uint32_t i = 0; i < n; i++) {
+    union {
+      double value;
+      uint64_t bits;
+    } number = {values[i]};
+    *sum = (*sum ^ number.bits) * UINT64_C(1099511628211);
+  }
+}
+
+bool ec_selftest(void) {
+  uint64_t sum = UINT64_C(14695981039346656037);
+  for (int i = 1; i <= EC_PROBES; i++) {
+    double x = EC_PROBE * i;
+    volatile double factor = x; /* read anew, so that the product is not the stored one */
+    volatile double square = x * x;
+    if (factor * factor - square != 0.0) return false; /* fused */
+    double probes[4] = {ec_sin(x), ec_log(x), ec_logistic(x), ec_sqrt(x)};
+    take_in(&sum, probes, 4);
+  }
+  for (uint32_t i = 0; i < EC_WIDTH; i++) ec_arena[i] = EC_PROBE;
+  ec_graph_begin();
+  while (!ec_graph_slice(EC_POINTS - 1)) continue;
+  for (const ec_task *task = ec_tasks; task < ec_tasks + EC_TASKS; task++) {
+    take_in(&sum, ec_arena + task->places.label, 1);
+    take_in(&sum, ec_arena + task->places.scores, task->labels);
+    take_in(&sum, ec_arena + task->places.distances, task->k);
+  }
+  return sum == ec_checksum;
+}
+
 void ec_begin(void) {
   ec_now.ended = true;
   announced = false;
-  waiting = 0;
+  phase = IDLE;
+  asked = due;
   last_s = -EC_INFINITY;
 }
 
 bool ec_is_touched(void) { return ec_now.under_way && !ec_now.ended; }
 
+bool ec_is_due(void) { return phase != IDLE || asked < due; }
+
+/* Put a question about what has been felt so far. */
+static void put(uint32_t point, double t_s, bool is_short) {
+  uint16_t doubts = ec_close(point) | flag(is_short, EC_SHORT);
+  ec_question next = {t_s, ec_now.onset_s, point, doubts, due == 0};
+  questions[due++] = next;
+}
+
 int ec_push(
     const uint16_t *counts, const bool *valid, double t_s, const double *joints,
     ec_event events[EC_MOST_EVENTS]) {
   int count = 0;
+  bool is_busy = phase == MEASURING || asked < due;
   if (!(t_s >= last_s) || t_s - t_s != 0.0) return EC_BAD_TIME;
   for (uint32_t i = joints ? EC_DOF : 0; i-- > 0;) {
     if (!(joints[i] >= -1e6 && joints[i] <= 1e6)) return EC_BAD_JOINTS;
   }
-  last_s = t_s;
+  bool is_first = last_s == -EC_INFINITY;
   if (ec_now.ended) announced = false;
-  int error = ec_follow(counts, valid, t_s, joints);
+  int error = ec_follow(counts, valid, t_s, joints, announced ? due : 0, is_busy);
   if (error) return error;
+  last_s = t_s;
+  if (is_first) ec_now.late = ec_now.under_way;
   if (!ec_now.under_way || ec_now.frames < EC_DEBOUNCE) return 0;
-  ec_event event = {EC_ONSET_EVENT, ec_now.onset_s, 0.0, 0.0, 0, -1, 0, 0, EC_NOTHING};
+  ec_event event = {EC_ONSET_EVENT, t_s, ec_now.onset_s, 0.0, 0.0, 0, -1, 0, 0, EC_NOTHING};
   if (!announced) {
     announced = true;
     events[count++] = event;
-    point = 0;
-    waiting = EC_TASKS;
-    for (uint32_t i = 0; i < EC_TASKS; i++) decided[i] = false;
+    due = 0;
+    asked = 0;
   }
   event.kind = EC_RELEASE_EVENT;
   if (ec_now.ended) events[count++] = event;
-  while (waiting && (ec_now.ended || t_s - ec_now.onset_s >= ec_windows_s[point])) {
-    count += decide(events + count, false);
-    point++;
+  while (due < EC_POINTS && (ec_now.ended || t_s - ec_now.onset_s >= ec_windows_s[due])) {
+    put(due, t_s, false);
   }
   return count;
 }
 
-int ec_finish(ec_event events[EC_MOST_EVENTS]) {
-  int count = 0;
-  point = EC_POINTS - 1;
-  if (waiting) count = decide(events, true);
-  ec_begin();
-  return count;
+/* Take up a question, if a task waits for the answer. */
+static void take_up(void) {
+  question = questions[asked++];
+  if (question.is_first) {
+    waiting = EC_TASKS;
+    for (uint32_t i = 0; i < EC_TASKS; i++) decided[i] = false;
+  }
+  if (!waiting) return;
+  phase = MEASURING;
+  ec_vector_begin();
+}
+
+int ec_work(ec_event events[EC_MOST_EVENTS]) {
+  if (phase == IDLE && asked < due) {
+    take_up();
+  } else if (phase == MEASURING) {
+    if (!ec_vector_slice(question.point)) return 0;
+    phase = COMPUTING;
+    ec_graph_begin();
+  } else if (phase == COMPUTING && ec_graph_slice(question.point)) {
+    phase = IDLE;
+    return decide(events);
+  }
+  return 0;
+}
+
+void ec_finish(void) {
+  if (ec_is_touched() && announced && due < EC_POINTS) put(EC_POINTS - 1, last_s, true);
+  ec_now.ended = true;
+  announced = false;
+  last_s = -EC_INFINITY;
 }

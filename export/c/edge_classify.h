@@ -1,6 +1,6 @@
 /* Decides what a robot's skin touches, from raw counts, with the bits of `edge-classify replay`.
-   One contact at a time; no heap, no recursion, no mathematical library. Its RAM is static: ec_rows,
-   ec_arena and 7 bytes a taxel, and a stack of less than 2 kB. EC_RAM in model.h is their sum.
+   One contact at a time; no heap, no recursion, no mathematical library. Its RAM is static, but for a
+   stack of less than 2 kB; EC_RAM in model.h is their sum.
 
    Compile every .c file of this folder with -std=c99 -ffp-contract=off. */
 #ifndef EDGE_CLASSIFY_H
@@ -10,6 +10,10 @@
 #include <stdint.h>
 
 #include "model.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
 
 typedef enum { EC_ONSET_EVENT, EC_RELEASE_EVENT, EC_DECIDED_EVENT } ec_kind;
 typedef enum { EC_NOTHING, EC_CONFIDENCE, EC_WINDOW } ec_stopped_by;
@@ -25,11 +29,17 @@ enum {
   EC_UNKNOWN = 64,
   EC_TIE = 128,
   EC_UNSURE = 256,
-  EC_UNCERTIFIED = 512
+  EC_UNCERTIFIED = 512,
+  EC_GAP = 1024,
+  EC_FROZEN = 2048,
+  EC_LATE = 4096,
+  EC_STILL_JOINTS = 8192,
+  EC_JOINT_LIMITS = 16384
 };
 
 typedef struct {
   ec_kind kind;
+  double t_s; /* of the frame that brought it about */
   double onset_s;
   /* of a decision */
   double window_s;
@@ -43,33 +53,49 @@ typedef struct {
 
 /* Errors of ec_push. */
 enum {
-  EC_TOO_FAST = -1,   /* more than EC_FRAMES frames in a window: the frame is left out */
+  EC_BUSY = -1,       /* a contact begins while the last is being measured: see ec_push */
   EC_BAD_TIME = -2,   /* time is not finite or goes back */
   EC_BAD_JOINTS = -3, /* an angle is not finite, or beyond a million radians */
 };
 
 #define EC_MOST_EVENTS (EC_TASKS + 2)
 
+/* Whether this program computes with the bits that it should, which options of a compiler change; call
+   it before ec_begin. */
+bool ec_selftest(void);
+
 /* Forget all: before the first frame, and where the stream has had a gap. */
 void ec_begin(void);
 
-/* Take in a frame. A contact that has ended is decided at once, from what was felt of it; others
-   when their windows end.
+/* Take in a frame, and tell onset and release. Decisions are left to ec_work. The rate of frames may
+   be any.
 
    counts: above the baseline, by rows from elbow to wrist; valid: which could be read, or NULL of
    all; t_s: seconds; joints: the EC_DOF angles in radians, or NULL where not known.
-   Returns the number of events, in the order of time, or an error below 0. */
+   Returns the number of events, in the order of time, or an error below 0. After EC_BUSY call
+   ec_work until it has nothing due, and push the frame again. */
 int ec_push(
     const uint16_t *counts, const bool *valid, double t_s, const double *joints,
     ec_event events[EC_MOST_EVENTS]);
 
+/* Whether ec_work has something to do. A decision is due when its window ends, or when the contact
+   has ended: then it is made of what was felt. */
+bool ec_is_due(void);
+
+/* Go on with what is due, by a slice of bounded length; returns the number of events. */
+int ec_work(ec_event events[EC_MOST_EVENTS]);
+
 /* Whether a contact is under way, so that no baseline may follow. */
 bool ec_is_touched(void);
 
-/* End the stream: tasks that wait are decided, flagged EC_SHORT. */
-int ec_finish(ec_event events[EC_MOST_EVENTS]);
+/* End the stream: tasks that wait are due, flagged EC_SHORT. */
+void ec_finish(void);
 
 extern const char *const ec_task_names[];
 extern const char *const *const ec_labels[]; /* of each task */
+
+#ifdef __cplusplus
+}
+#endif
 
 #endif

@@ -1,4 +1,5 @@
-/* What the rooms share. Data flows one way: region, contact, features, graph, decide. */
+/* What the rooms share. Data flows one way: region, contact, samples and doubts, features,
+   graph, decide. */
 #ifndef EC_INTERNAL_H
 #define EC_INTERNAL_H
 
@@ -10,14 +11,20 @@
 #include "edge_classify.h"
 
 /* A sum that is fused with its product has other bits. gcc knows no pragma against it: where the
-   processor has such an instruction, say that -ffp-contract=off is given. */
-#if defined(__FP_FAST_FMA) && !defined(EC_NO_CONTRACTION)
+   processor has such an instruction for doubles, say that -ffp-contract=off is given. */
+#if defined(__clang__) || !defined(__GNUC__)
+#pragma STDC FP_CONTRACT OFF
+#elif !defined(EC_NO_CONTRACTION)
+#if defined(__FP_FAST_FMA) || defined(__FMA__) || defined(__FMA4__)
 #error "compile with -ffp-contract=off -DEC_NO_CONTRACTION"
+#elif defined(__ARM_FEATURE_FMA) && defined(__ARM_FP) && (__ARM_FP & 8)
+#error "compile with -ffp-contract=off -DEC_NO_CONTRACTION"
+#endif
 #endif
 #if defined(__ASSOCIATIVE_MATH__) || defined(__RECIPROCAL_MATH__) || __FINITE_MATH_ONLY__
 #error "compile without -ffast-math and the options of which it consists"
 #endif
-#if DBL_MANT_DIG != 53 || FLT_EVAL_METHOD != 0
+#if DBL_MANT_DIG != 53 || (FLT_EVAL_METHOD != 0 && FLT_EVAL_METHOD != 1)
 #error "doubles must have 64 bits, and be computed as these, not in wider registers"
 #endif
 
@@ -36,6 +43,8 @@ double ec_frexp(double x, int *power); /* x above 0 is a fraction from 0.5 to 1 
 typedef bool ec_set[EC_ROWS * EC_COLS];
 
 typedef struct {
+  uint32_t begin; /* of the active taxels, and the end of them */
+  uint32_t end;
   uint32_t area;
   uint16_t peak;
   ec_set taxels;
@@ -56,19 +65,38 @@ void ec_zone(
 #define EC_INFINITY ((double)INFINITY)
 #define EC_AT_LEAST_1(n) ((n) ? (n) : 1)
 
+/* What may be unknown in a frame, by its place in a row: the centroids of zones, along and around,
+   then these. */
+enum {
+  EC_OF_STIFFNESS = 2 * EC_ZONES,
+  EC_OF_MOTION,
+  EC_OF_FORCE_MOTION,
+  EC_OF_JOINTS,
+  EC_UNSURE_VALUES = EC_OF_JOINTS + EC_JOINTS
+};
+
+/* A frame of a contact. */
 typedef struct {
   double t; /* seconds from onset */
   double motions[2]; /* of the centroid, and of the force-weighted one */
-  int64_t zones[EC_AT_LEAST_1(EC_ZONES)][EC_ZONE_WIDTH];
   double joints[EC_AT_LEAST_1(EC_JOINTS)];
+  int64_t zones[EC_AT_LEAST_1(EC_ZONES)][EC_ZONE_WIDTH];
   uint32_t cells[EC_AT_LEAST_1(EC_CELLS)];
   uint32_t kernel_cells[EC_AT_LEAST_1(EC_KERNEL_CELLS)];
   uint32_t area; /* 0 without contact */
   uint16_t peak;
+  bool same; /* as the frame before it, bit for bit */
+  /* samples.c fills in the others */
+  bool is_spread[EC_AT_LEAST_1(EC_ZONES)]; /* whether spreads are known */
+  double spreads[EC_AT_LEAST_1(EC_ZONES)][5];
+  double unsure[EC_UNSURE_VALUES]; /* not a number where not known */
+  double column[EC_AT_LEAST_1(EC_ZONES)]; /* of the centroid when it was last known */
+  double turns[EC_AT_LEAST_1(EC_ZONES)]; /* in columns, that are added to it */
 } ec_row;
 
 typedef struct {
-  bool known;
+  bool is_known;
+  bool is_settled; /* by a frame that no later reading replaces */
   double point[3];
 } ec_start;
 
@@ -77,22 +105,40 @@ typedef struct {
   bool ended;
   bool missing_taxels;
   bool missing_pose;
+  bool late; /* under way in the first frame */
   double onset_s;
   double age_s; /* of the last frame taken in */
   double touched_s; /* when it was last felt */
   uint32_t frames;
-  uint32_t rows; /* frames that were taken in */
+  bool has_row;
   ec_region region; /* when it was last seen */
   ec_start starts[2];
 } ec_contact;
 
 extern ec_contact ec_now;
-extern ec_row ec_rows[EC_FRAMES];
-int ec_follow(const uint16_t *counts, const bool *valid, double t, const double *joints);
+int ec_follow(
+    const uint16_t *counts, const bool *valid, double t, const double *joints,
+    uint32_t first_point, bool is_busy);
 bool ec_released(double touched_s, double now_s);
+uint16_t ec_close(uint32_t point);
+
+/* samples.c: the values of each course at the sample times of a decision point, and those of the
+   channels of kernels */
+#define EC_SAMPLES_OF_KERNELS 120
+extern double ec_values[EC_POINTS][EC_AT_LEAST_1(EC_VALUES)];
+extern uint16_t ec_channels[EC_POINTS][EC_AT_LEAST_1(EC_CHANNELS)][EC_SAMPLES_OF_KERNELS];
+void ec_samples_begin(void);
+void ec_samples_take(ec_row *row, uint32_t first_point);
+void ec_samples_close(uint32_t point, ec_row *row);
+
+/* doubts.c */
+void ec_doubts_begin(void);
+void ec_doubts_take(const ec_row *row);
+uint16_t ec_doubts(const ec_row *row, double window_s);
 
 /* features.c */
-void ec_vector(double window_s);
+void ec_vector_begin(void);
+bool ec_vector_slice(uint32_t point);
 
 /* model.c: the skin and the arm */
 typedef struct {
@@ -109,6 +155,14 @@ typedef struct {
   uint8_t kind;
 } ec_link;
 
+/* Of a joint that features are made of. */
+typedef struct {
+  double low;
+  double high;
+  double still_s; /* how long an angle stayed the same in training */
+} ec_limit;
+
+extern const ec_limit ec_limits[];
 extern const ec_angle ec_angles[];
 extern const ec_link ec_links[];
 extern const bool ec_alive[];
@@ -129,11 +183,18 @@ enum {
 enum { EC_T_NONE, EC_T_LOG, EC_T_SQRT, EC_T_RELATIVE };
 enum { EC_S_, EC_S_RATE, EC_S_MEAN, EC_S_DEVIATION, EC_S_ROUGHNESS };
 
+/* A quantity of a zone at some times of the window; several features may be made of it. */
 typedef struct {
-  double floor; /* of the first transform, where it is a logarithm */
   uint16_t samples;
   uint16_t rows; /* cells or joints */
-  uint8_t zone;
+  uint8_t zone; /* index in ec_zone_names */
+  uint8_t quantity;
+  uint32_t place; /* of the first in ec_values */
+} ec_course;
+
+typedef struct {
+  double floor; /* of the first transform, where it is a logarithm */
+  uint8_t course;
   uint8_t quantity;
   uint8_t transforms[3];
   uint8_t summary;
@@ -146,33 +207,41 @@ typedef struct {
   uint8_t biases_of_dilation[4];
 } ec_kernels;
 
+extern const ec_course ec_courses[];
 extern const ec_feature ec_features[];
 extern const ec_kernels ec_taxel_kernels;
 extern const ec_kernels ec_zone_kernels;
 
-/* model.c: the numbers of graph.c, each in the smallest type that holds it exactly. */
+/* model.c: the numbers of graph.c, each in the smallest type that holds it exactly. Of a palette, a
+   byte for each says which of some doubles it is. Rows of a packed matrix begin with the bits of a
+   number, and then have these. */
 typedef float float32_t;
 typedef double float64_t;
-enum { EC_INT8, EC_INT16, EC_INT32, EC_FLOAT32, EC_FLOAT64 };
+enum { EC_INT8, EC_INT16, EC_INT32, EC_FLOAT32, EC_FLOAT64, EC_PALETTE, EC_PACKED };
 
 typedef struct {
   const void *data;
+  const double *palette;
   uint32_t stride; /* from a decision point to the next; 0 where they share the numbers */
+  uint16_t columns; /* of a packed matrix */
   uint8_t type;
+  uint8_t shift; /* a packed number is so many times halved */
 } ec_table;
+
+#define EC_NOWHERE 65535
 
 /* A node of the graph. Places below EC_ARENA are in the arena; the others are tables. */
 typedef struct {
+  uint16_t inputs[5];
+  uint16_t outputs[3];
+  uint16_t sizes[4];
   uint8_t operator;
-  uint32_t inputs[3];
-  uint32_t outputs[2];
-  uint32_t sizes[4];
 } ec_step;
 
 enum {
   EC_ADD, EC_SUB, EC_MUL, EC_DIV, EC_MAX, EC_LESSOREQUAL, EC_WHERE, EC_CLIP, EC_ROUND, EC_SQUEEZE,
   EC_SQRT, EC_GEMM, EC_MATMUL, EC_REDUCEL1, EC_REDUCESUM, EC_REDUCESUMSQUARE, EC_REDUCEMEAN,
-  EC_TOPK, EC_GATHER, EC_GATHERELEMENTS, EC_GATHERND, EC_PAD, EC_ARGMAX
+  EC_TOPK, EC_GATHER, EC_GATHERELEMENTS, EC_GATHERND, EC_PAD, EC_ARGMAX, EC_PROJECT, EC_FINITE
 };
 
 extern const ec_table ec_tables[];
@@ -207,9 +276,13 @@ extern const double ec_novel[];
 extern const double ec_remote[];
 extern const double ec_middles[];
 extern const double ec_slopes[];
+extern const uint64_t ec_checksum; /* of the outputs for features that are all EC_PROBE */
+#define EC_PROBE 0.3
+#define EC_PROBES 8
 
 /* graph.c: edge/model/graph.py */
 extern double ec_arena[EC_ARENA];
-void ec_graph(uint32_t point);
+void ec_graph_begin(void);
+bool ec_graph_slice(uint32_t point);
 
 #endif

@@ -20,6 +20,7 @@ int main(void) {
   static uint16_t counts[EC_ROWS * EC_COLS];
   ec_event events[EC_MOST_EVENTS];
   double t_s;
+  if (!ec_selftest()) return 1;
   ec_begin();
   while (scanf("%lf", &t_s) == 1) {
     for (int i = 0; i < EC_ROWS * EC_COLS; i++) {
@@ -28,6 +29,10 @@ int main(void) {
     int count = ec_push(counts, NULL, t_s, NULL, events);
     if (count < 0) fprintf(stderr, "the frame at %.3f s is refused: %d\n", t_s, count);
     for (int i = 0; i < count; i++) print(&events[i]);
+    while (ec_is_due()) {
+      count = ec_work(events);
+      for (int i = 0; i < count; i++) print(&events[i]);
+    }
   }
   return 0;
 }

@@ -3,11 +3,13 @@
 
 const bool ec_alive[] = $alive;
 const ec_angle ec_angles[] = $angles;
+const ec_limit ec_limits[] = $limits;
 const ec_link ec_links[] = $links;
 
 const uint8_t ec_zone_names[] = $zone_names;
 const int16_t ec_cell_of_taxel[] = $cell_of_taxel;
 const int16_t ec_kernel_cell_of_taxel[] = $kernel_cell_of_taxel;
+const ec_course ec_courses[] = $courses;
 const ec_feature ec_features[] = $features;
 const ec_kernels ec_taxel_kernels = $taxel_kernels;
 const ec_kernels ec_zone_kernels = $zone_kernels;
@@ -24,3 +26,4 @@ const double ec_novel[] = $novel;
 const double ec_remote[] = $remote;
 const double ec_middles[] = $middles;
 const double ec_slopes[] = $slopes;
+const uint64_t ec_checksum = UINT64_C($checksum);

@@ -24,13 +24,20 @@
 /* a contact, and what is measured in its frames */
 #define EC_DEBOUNCE $debounce
 #define EC_WINDOW_S $window_s
-#define EC_FRAMES $frames
+#define EC_LONG_STEPS $long_steps
+#define EC_REPEATS $repeats
+#define EC_LONG_STEP_S $long_step_s
 #define EC_ZONES ($zone_names_count - 1)
 #define EC_CELLS $cells
 #define EC_KERNEL_CELLS $kernel_cells
 #define EC_MOTION $motion
 #define EC_FORCE_MOTION $force_motion
+#define EC_CENTROIDS $centroids
 #define EC_SPREADS $spreads
+#define EC_COURSES $courses_count
+#define EC_VALUES $value_count
+#define EC_ZONE_CHANNELS $zone_channels
+#define EC_CHANNELS $channels
 
 /* the features */
 #define EC_FEATURES $features_count
@@ -44,6 +51,7 @@
 /* the graph, and where it leaves its outputs */
 #define EC_ARENA $arena
 #define EC_STEPS $steps_count
+#define EC_MOST_COLUMNS $most_columns
 #define EC_PLACE_OUT_OF_RANGE $place_out_of_range
 #define EC_PLACE_NOVELTY $place_novelty
 #define EC_PLACE_REMOTENESS $place_remoteness

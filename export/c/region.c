@@ -66,11 +66,16 @@ void ec_largest(
   component best = {0, 0, 0};
   uint16_t best_label = 0;
   uint16_t label = 0;
+  uint32_t begin = TAXELS;
+  uint32_t end = 0;
   for (uint32_t i = 0; i < TAXELS; i++) {
     active[i] = counts[i] > EC_THRESHOLD_COUNTS && EC_READABLE(valid, i);
     labels[i] = 0;
+    if (!active[i]) continue;
+    if (begin == TAXELS) begin = i;
+    end = i + 1;
   }
-  for (uint32_t i = 0; i < TAXELS; i++) {
+  for (uint32_t i = begin; i < end; i++) {
     if (!active[i] || labels[i]) continue;
     component next = flood(i, ++label, active, counts, previous);
     if (is_before(next, best)) {
@@ -78,6 +83,8 @@ void ec_largest(
       best_label = label;
     }
   }
+  region->begin = begin;
+  region->end = end;
   region->area = best.area;
   region->peak = best.peak;
   for (uint32_t i = 0; i < TAXELS; i++) region->taxels[i] = best.area && labels[i] == best_label;
@@ -108,36 +115,57 @@ static uint32_t best_cut(const int64_t weights[EC_COLS]) {
   return best;
 }
 
+/* Where a circle of columns is cut for some taxels. */
+static uint32_t cut_of(const bool *taxels, const ec_region *region, const uint16_t *counts) {
+  int64_t weights[EC_COLS] = {0};
+  uint32_t col = region->begin % EC_COLS;
+  for (uint32_t i = region->begin; i < region->end; i++) {
+    if (taxels[i]) weights[col] += counts ? counts[i] : 1;
+    if (++col == EC_COLS) col = 0;
+  }
+  return best_cut(weights);
+}
+
+/* Of a row: no sum of 25 columns exceeds 32 bits. */
+#if EC_COLS <= 25
+typedef uint32_t sum_of_row;
+#else
+typedef uint64_t sum_of_row;
+#endif
+
 /* Largest count, taxels, sum of counts, and the sums of counts times row, column, row squared, row
    times column, column squared. Without counts each taxel counts 1. */
 void ec_zone(
     ec_zone_name zone, const ec_set active, const ec_region *region, const uint16_t *counts,
     int64_t numbers[EC_ZONE_WIDTH]) {
   const bool *taxels = zone == EC_CONTACT ? region->taxels : active;
-  uint32_t begin = zone == EC_RIGHT ? EC_COLS / 2 : 0;
-  uint32_t end = zone == EC_LEFT ? EC_COLS / 2 : EC_COLS;
-  uint32_t cut = 0;
-  if (EC_WRAPS && (zone == EC_CONTACT || zone == EC_SKIN)) {
-    int64_t weights[EC_COLS] = {0};
-    for (uint32_t i = 0; i < TAXELS; i++) {
-      if (taxels[i]) weights[i % EC_COLS] += counts ? counts[i] : 1;
-    }
-    cut = best_cut(weights);
-  }
+  uint32_t first = zone == EC_RIGHT ? EC_COLS / 2 : 0;
+  uint32_t last = zone == EC_LEFT ? EC_COLS / 2 : EC_COLS;
+  bool is_round = EC_WRAPS && (zone == EC_CONTACT || zone == EC_SKIN);
+  uint32_t cut = is_round ? cut_of(taxels, region, counts) : 0;
   for (uint32_t i = 0; i < EC_ZONE_WIDTH; i++) numbers[i] = 0;
-  for (uint32_t i = 0; i < TAXELS; i++) {
-    uint32_t col = i % EC_COLS;
-    if (!taxels[i] || col < begin || col >= end) continue;
-    int64_t count = counts ? counts[i] : 1;
-    int64_t row = i / EC_COLS;
-    int64_t turned = col < cut ? col + EC_COLS : col;
-    if (count > numbers[0]) numbers[0] = count;
-    numbers[1]++;
-    numbers[2] += count;
-    numbers[3] += count * row;
-    numbers[4] += count * turned;
-    numbers[5] += count * row * row;
-    numbers[6] += count * row * turned;
-    numbers[7] += count * turned * turned;
+  uint32_t end = (region->end + EC_COLS - 1) / EC_COLS;
+  for (uint32_t row = region->begin / EC_COLS; row < end; row++) {
+    sum_of_row force = 0;
+    sum_of_row cols = 0;
+    sum_of_row squares = 0;
+    for (uint32_t col = first; col < last; col++) {
+      if (!taxels[row * EC_COLS + col]) continue;
+      uint32_t count = counts ? counts[row * EC_COLS + col] : 1;
+      uint32_t turned = col < cut ? col + EC_COLS : col;
+      sum_of_row product = (sum_of_row)count * turned;
+      if (count > numbers[0]) numbers[0] = count;
+      numbers[1]++;
+      force += count;
+      cols += product;
+      squares += product * turned;
+    }
+    if (force == 0) continue;
+    numbers[2] += (int64_t)force;
+    numbers[3] += (int64_t)force * row;
+    numbers[4] += (int64_t)cols;
+    numbers[5] += (int64_t)force * row * row;
+    numbers[6] += (int64_t)cols * row;
+    numbers[7] += (int64_t)squares;
   }
 }

@@ -242,7 +242,6 @@ def test_every_feature_of_damaged_recordings_has_the_same_bits(
         debounce=int(rng.integers(1, 4)),
     )
     monkeypatch.setattr(c_code, "CompiledGraph", NoGraph)
-    monkeypatch.setattr(c_code, "RATE_HZ", 250.0)
     c_code.export(model, tmp_path)
     command = machine.compiled(tmp_path)
     recordings = [*recordings_for(layout, 25, rng), *on_the_edges(layout)]
@@ -292,6 +291,35 @@ def test_the_baseline_follows_as_pythons(tmp_path):
     assert np.unique(answer).size > 10
 
 
+RATES = (50, 100, 125, 200, 500, 1000)
+
+
+@pytest.mark.slow
+@needs_gcc
+def test_a_stream_of_any_rate_has_the_same_events(early, tmp_path):
+    """At once, and with few slices of work after each frame, so that a contact begins
+    while the last is being decided; smoothly, and in bursts."""
+    model, _ = early
+    error = max(s.rules[-1].error for s in model.info.stopping.values())
+    streams = []
+    for rate in RATES:
+        parts = [
+            touch(seed=i, seconds=seconds, rate=float(rate))
+            for i, seconds in enumerate((0.7, 0.7, 1.6))
+        ]
+        stream = in_a_row(*parts, rest=round(0.4 * rate))
+        stream = replace(stream, t=np.arange(len(stream.t)) / rate)
+        bursts = np.floor(stream.t * 12.0) / 12.0 + stream.t * 1e-3
+        streams += [stream, replace(stream, t=bursts)]
+    for error_rate in (None, error):
+        c_code.export(model, tmp_path, error_rate)
+        command = machine.compiled(tmp_path)
+        for slices in (0, 1, 40):
+            assert_same_events(model, tmp_path, command, streams, error_rate, slices)
+    kinds = {kind for s in streams for kind in machine.events(model, s)[:, 0].tolist()}
+    assert kinds == {0.0, 1.0, 2.0}
+
+
 @pytest.mark.slow
 @needs_gcc
 def test_a_frame_that_cannot_be_taken_in_is_an_error(tmp_path):
@@ -301,7 +329,6 @@ def test_a_frame_that_cannot_be_taken_in_is_an_error(tmp_path):
     t = recording.t
     joints = recording.joints
     for changed, error in (
-        (replace(recording, t=t / 3.0), "error -1"),  # more than there is room for
         (replace(recording, t=np.where(t == t[5], -1.0, t)), "error -2"),
         (replace(recording, t=np.where(t == t[5], np.nan, t)), "error -2"),
         (
@@ -322,6 +349,37 @@ def test_options_that_change_bits_do_not_compile(tmp_path):
         words = ["gcc", option, "-c", "graph.c", "-o", "graph.o"]
         ended = subprocess.run(words, cwd=tmp_path, capture_output=True, check=False)
         assert b"#error" in ended.stderr
+
+
+@needs_gcc
+@pytest.mark.skipif(
+    " fma " not in Path("/proc/cpuinfo").read_text(),
+    reason="this machine fuses nothing",
+)
+@pytest.mark.parametrize("contract", ["off", "fast"])
+def test_the_selftest_tells_fused_instructions(tmp_path, contract):
+    c_code.export(Model(demo.MODEL), tmp_path)
+    options = f"-mfma -ffp-contract={contract} -DEC_NO_CONTRACTION".split()
+    command = machine.compiled(tmp_path, options=options)
+    passed = machine.ask(command, tmp_path, [machine.ABOUT_ITSELF])
+    assert passed.tolist() == [contract == "off"]
+
+
+@pytest.mark.slow
+@needs_qemu
+@pytest.mark.parametrize(("board", "index"), [("M4F", 0), ("M0+", 1)])
+def test_the_cost_that_export_prints_is_what_qemu_counts(early, tmp_path, board, index):
+    for model, recording in (
+        (early[0], early[1][0]),
+        (Model(demo.MODEL), load(demo.FOLDER / "pillow-movable.npz")),
+    ):
+        source = c_code.Source(model)
+        source.write(tmp_path)
+        command = [*machine.compiled(tmp_path, board), "-icount", "shift=0"]
+        question = machine.about_recording(machine.COSTS, recording)
+        *_, slice_, decision = machine.ask(command, tmp_path, [question])
+        assert source.instructions()[index] == pytest.approx(decision, rel=0.1)
+        assert slice_ < (100e3, 300e3)[index]
 
 
 def test_what_c_lacks_is_one_sentence(tmp_path):

@@ -71,4 +71,4 @@ def test_the_arena_is_shared_by_values_that_do_not_meet():
     model = Model(demo.MODEL)
     graph = CompiledGraph(model, model.outputs, [0], 0)
     values = sum(len(step.outputs) * step.sizes[0] for step in graph.steps)
-    assert graph.arena < values / 3
+    assert graph.arena < values / 2

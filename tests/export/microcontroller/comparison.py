@@ -24,8 +24,8 @@ def assert_same(model, folder, recordings, vectors=(), error=None, board=None):
     command = machine.compiled(folder, board)
     last = len(model.decision_points_s) - 1
     points = [last] if error is None else [*range(last + 1)]
-    questions = []
-    expected = []
+    questions = [machine.ABOUT_ITSELF]
+    expected = [[1.0]]
     for i, vector in enumerate(vectors):
         point = i % len(points)
         questions.append(machine.about_vector(point, vector))
@@ -39,12 +39,15 @@ def assert_same(model, folder, recordings, vectors=(), error=None, board=None):
     assert_same_events(model, folder, command, recordings, error)
 
 
-def assert_same_events(model, folder, command, recordings, error=None):
-    """Compare every bit of the events of recordings."""
-    questions = [
-        machine.about_recording(machine.EVENTS_OF_RECORDING, r) for r in recordings
-    ]
-    rows = machine.ask(command, folder, questions).reshape(-1, 9)
+def assert_same_events(model, folder, command, recordings, error=None, slices=0):
+    """Compare every bit of the events of recordings.
+
+    Args:
+        slices: of a decision that C may compute after each frame; 0: all.
+    """
+    kind = machine.EVENTS_OF_RECORDING + slices
+    questions = [machine.about_recording(kind, r) for r in recordings]
+    rows = machine.ask(command, folder, questions).reshape(-1, machine.FIELDS)
     ends = np.flatnonzero(rows[:, 0] == -1.0)
     answers = np.split(rows, ends)[:-1]
     for answer, recording in zip(answers, recordings, strict=True):
@@ -54,9 +57,10 @@ def assert_same_events(model, folder, command, recordings, error=None):
 
 def ordered(events):
     """By contact, kind and task: C decides a contact that has ended before its window
-    does, so its events come in another order, and never short."""
+    does, so its events come in another order, with its release, and never short."""
     events = events.copy()
-    ended = events[events[:, 0] == 1, 1]
-    decided = np.isin(events[:, 1], ended) & (events[:, 0] == 2)
-    events[decided, 6] -= events[decided, 6] % 2
+    for onset_s, released_s in events[events[:, 0] == 1][:, [1, -1]]:
+        decided = (events[:, 1] == onset_s) & (events[:, 0] == 2)
+        events[decided, 6] -= events[decided, 6] % 2
+        events[decided, -1] = np.minimum(events[decided, -1], released_s)
     return events[np.lexsort((events[:, 2], events[:, 0], events[:, 1]))]

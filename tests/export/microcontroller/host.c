@@ -5,7 +5,8 @@
 #include "baseline.h"
 #include "internal.h"
 
-enum { VECTOR, VECTORS_OF_RECORDING, EVENTS_OF_RECORDING, BASELINE };
+/* Behind the last one, the slices of a decision for each frame are added. */
+enum { VECTOR, VECTORS_OF_RECORDING, BASELINE, COSTS, SELFTEST, EVENTS_OF_RECORDING };
 
 typedef struct {
   double t;
@@ -53,46 +54,69 @@ static void give_outputs(void) {
   give(ec_arena + EC_PLACE_REMOTENESS, 1);
 }
 
+static void give_vector(uint32_t point) {
+  ec_close(point);
+  ec_vector_begin();
+  while (!ec_vector_slice(point)) continue;
+  give(ec_arena, EC_WIDTH);
+}
+
+/* Of the first contact, each when its window ends. */
 static void give_vectors(uint32_t frames) {
-  bool done = false;
+  const double one = 1.0;
+  const double none = 0.0;
+  uint32_t point = 0;
+  bool is_there = false;
   ec_begin();
   for (uint32_t i = 0; i < frames; i++) {
     frame next = next_frame();
-    if (done) continue;
-    ec_follow(next.counts, next.valid, next.t, next.has_joints ? next.joints : 0);
-    bool confirmed = ec_now.under_way && ec_now.frames >= EC_DEBOUNCE;
-    done = confirmed && (ec_now.ended || ec_now.age_s >= EC_WINDOW_S);
-    done = done || (confirmed && i + 1 == frames);
+    if (point == EC_POINTS || (is_there && ec_now.ended)) continue;
+    ec_follow(next.counts, next.valid, next.t, next.has_joints ? next.joints : 0, point, false);
+    if (!ec_now.under_way || ec_now.frames < EC_DEBOUNCE) continue;
+    if (!is_there) give(&one, 1);
+    is_there = true;
+    double age_s = ec_now.ended ? EC_INFINITY : next.t - ec_now.onset_s;
+    while (point < EC_POINTS && age_s >= ec_windows_s[point]) give_vector(point++);
   }
-  double is_there = done;
-  give(&is_there, 1);
-  for (uint32_t point = 0; done && point < EC_POINTS; point++) {
-    ec_vector(ec_windows_s[point]);
-    give(ec_arena, EC_WIDTH);
-  }
+  while (is_there && point < EC_POINTS) give_vector(point++);
+  if (!is_there) give(&none, 1);
 }
 
 static void give_events(const ec_event *events, int count) {
   if (count < 0) fprintf(stderr, "error %d\n", count);
   for (int i = 0; i < count; i++) {
     const ec_event *e = &events[i];
-    double fields[9] = {e->kind,  e->onset_s, e->task, e->label,     e->window_s, e->confidence,
-                        e->flags, e->nearest, e->stopped_by};
-    give(fields, 9);
+    double fields[10] = {e->kind,       e->onset_s, e->task,    e->label,      e->window_s,
+                         e->confidence, e->flags,   e->nearest, e->stopped_by, e->t_s};
+    give(fields, 10);
   }
 }
 
-static void classify(uint32_t frames) {
+static void work(void) {
   ec_event events[EC_MOST_EVENTS];
-  double end[9] = {-1.0};
+  while (ec_is_due()) give_events(events, ec_work(events));
+}
+
+/* slices: how many ec_work has after each frame; 0: as many as it wants. */
+static void classify(uint32_t frames, uint32_t slices) {
+  ec_event events[EC_MOST_EVENTS];
+  double end[10] = {-1.0};
   ec_begin();
   for (uint32_t i = 0; i < frames; i++) {
     frame next = next_frame();
     const double *joints = next.has_joints ? next.joints : 0;
-    give_events(events, ec_push(next.counts, next.valid, next.t, joints, events));
+    int count = ec_push(next.counts, next.valid, next.t, joints, events);
+    if (count == EC_BUSY) {
+      work();
+      count = ec_push(next.counts, next.valid, next.t, joints, events);
+    }
+    give_events(events, count);
+    for (uint32_t j = 0; j < slices && ec_is_due(); j++) give_events(events, ec_work(events));
+    if (slices == 0) work();
   }
-  give_events(events, ec_finish(events));
-  give(end, 9);
+  ec_finish();
+  work();
+  give(end, 10);
 }
 
 /* Raw counts, which the baseline follows by steps of 300 within 20 counts, from those of the first
@@ -109,6 +133,45 @@ static void follow(uint32_t frames) {
   }
 }
 
+#if defined(__arm__)
+/* With -icount shift=0 QEMU takes a nanosecond for an instruction; the timer of its boards counts down
+   at 25 MHz. */
+#define TIMER ((volatile uint32_t *)0xE000E010u) /* SysTick's registers */
+#define INSTRUCTIONS_OF_TICK 40.0
+static void start_timer(void) {
+  TIMER[1] = 0xFFFFFFu;
+  TIMER[2] = 0;
+  TIMER[0] = 5;
+}
+static uint32_t ticks(void) { return 0xFFFFFFu - TIMER[2]; }
+#else
+#define INSTRUCTIONS_OF_TICK 0.0
+static void start_timer(void) {}
+static uint32_t ticks(void) { return 0; }
+#endif
+
+/* The instructions of the longest ec_push, of all frames, of the longest slice, and of all slices. */
+static void measure(uint32_t frames) {
+  double costs[4] = {0.0};
+  ec_event events[EC_MOST_EVENTS];
+  start_timer();
+  ec_begin();
+  for (uint32_t i = 0; i < frames; i++) {
+    frame next = next_frame();
+    uint32_t begin = ticks();
+    ec_push(next.counts, next.valid, next.t, next.has_joints ? next.joints : 0, events);
+    for (uint32_t part = 0; part == 0 || ec_is_due(); part += 2) {
+      if (part) ec_work(events);
+      uint32_t end = ticks();
+      double spent = INSTRUCTIONS_OF_TICK * ((end - begin) & 0xFFFFFFu);
+      if (spent > costs[part ? 2 : 0]) costs[part ? 2 : 0] = spent;
+      costs[part ? 3 : 1] += spent;
+      begin = ticks();
+    }
+  }
+  give(costs, 4);
+}
+
 int main(void) {
   uint32_t question[2];
   input = fopen("input.bin", "rb");
@@ -117,14 +180,20 @@ int main(void) {
   while (fread(question, 4, 2, input) == 2) {
     if (question[0] == VECTOR) {
       take(ec_arena, 8 * EC_WIDTH);
-      ec_graph(question[1]);
+      ec_graph_begin();
+      while (!ec_graph_slice(question[1])) continue;
       give_outputs();
     } else if (question[0] == VECTORS_OF_RECORDING) {
       give_vectors(question[1]);
     } else if (question[0] == BASELINE) {
       follow(question[1]);
+    } else if (question[0] == COSTS) {
+      measure(question[1]);
+    } else if (question[0] == SELFTEST) {
+      double passed = ec_selftest();
+      give(&passed, 1);
     } else {
-      classify(question[1]);
+      classify(question[1], question[0] - EVENTS_OF_RECORDING);
     }
   }
   fclose(output);

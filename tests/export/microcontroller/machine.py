@@ -7,12 +7,13 @@ from pathlib import Path
 
 import numpy as np
 
-from edge.classifier import Classifier
+from edge.classifier import Classifier, suited
 from edge.events import Decided, Onset, Release
-from edge.touch.first_contact import first_contact
 
 HERE = Path(__file__).parent
-VECTOR, VECTORS_OF_RECORDING, EVENTS_OF_RECORDING, BASELINE = range(4)
+VECTOR, VECTORS_OF_RECORDING, BASELINE, COSTS, SELFTEST, EVENTS_OF_RECORDING = range(6)
+ABOUT_ITSELF = struct.pack("<II", SELFTEST, 0)
+"""The question whether `ec_selftest` passes."""
 WARNINGS = "-Wall -Wextra -Werror -Wconversion -Wdouble-promotion -pedantic"
 COMMON = f"-std=c99 -O2 -ffp-contract=off {WARNINGS}".split()
 SANITIZED = "-fsanitize=undefined,address -fno-sanitize-recover=all".split()
@@ -31,9 +32,11 @@ BOARDS = {
 has no board with a Cortex-M0+ of enough memory; its code runs on a Cortex-M3."""
 FLAGS = (
     "short missing_taxels missing_pose as_trained out_of_range unusual unknown tie unsure "
-    "uncertified".split()
+    "uncertified gap frozen late still_joints joint_limits".split()
 )
 """In the order of their bits in C."""
+FIELDS = 10
+"""Numbers of an event."""
 
 
 def tools(board):
@@ -46,12 +49,22 @@ def tools(board):
     return gcc, qemu.split()
 
 
-def compiled(folder, board=None):
+def compiled(folder, board=None, options=SANITIZED):
     """The command that answers `input.bin` in a folder of C."""
     rooms = [path for path in folder.glob("*.c") if path.name != "main.c"]
     program = folder / f"answer-{board or 'host'}"
-    gcc, command = tools(board) if board else (["gcc", *SANITIZED], [])
-    words = [*gcc, *COMMON, "-I", folder, *rooms, HERE / "host.c", "-o", program]
+    gcc, command = tools(board) if board else (["gcc"], [])
+    words = [
+        *gcc,
+        *COMMON,
+        *([] if board else options),
+        "-I",
+        folder,
+        *rooms,
+        HERE / "host.c",
+        "-o",
+        program,
+    ]
     subprocess.run(words, check=True)
     return [*command, program]
 
@@ -101,32 +114,50 @@ def outputs(model, point, vector):
 
 
 def vectors(model, points, recording):
-    """As `give_vectors`."""
-    contact = first_contact(recording, model.info.tracker(recording.layout))
+    """As `give_vectors`: of the first contact, each when its window ends."""
+    tracker = model.info.tracker(recording.layout)
+    windows_s = [model.decision_points_s[point] for point in points]
+    measured = []
+    contact = None
+    for frame in recording:
+        for contact in tracker.push(frame):
+            age_s = math.inf if contact.ended else frame.t - contact.onset_s
+            while windows_s and age_s >= windows_s[0]:
+                measured.append(model.info.vector(contact.series(), windows_s.pop(0)))
+        if not windows_s or (contact is not None and contact.ended):
+            break
     if contact is None:
         return np.array([0.0])
-    windows_s = [model.decision_points_s[point] for point in points]
-    measured = [model.info.vector(contact[1], window_s) for window_s in windows_s]
+    measured += [model.info.vector(contact.series(), window) for window in windows_s]
     return np.concatenate([[1.0], *measured])
 
 
 def events(model, recording, error=None):
-    """As `classify` in host.c, of an event a row."""
-    tasks = list(model.info.tasks)
+    """As `classify` in host.c, of an event a row; the last number is the time of the
+    frame that brought it about."""
+    classifier = Classifier(model, recording.layout, error=error)
     rows = []
-    for event in Classifier(model, recording.layout, error=error).classify(recording):
-        if isinstance(event, Onset | Release):
-            kind = float(isinstance(event, Release))
-            rows.append([kind, event.onset_s, 0, -1, 0, 0, 0, 0, 0])
-        elif isinstance(event, Decided):
-            labels = model.info.tasks[event.task].labels
-            label = -1 if event.label is None else labels.index(event.label)
-            flags = sum(1 << i for i, flag in enumerate(FLAGS) if flag in event.flags)
-            confidence = math.nan if event.confidence is None else event.confidence
-            decision = event.decision
-            nearest = 0 if decision is None else int(decision.neighbours[0])
-            stopped = (None, "confidence", "window").index(event.stopped_by)
-            task = tasks.index(event.task)
-            row = [2, event.onset_s, task, label, event.window_s, confidence, flags]
-            rows.append([*row, nearest, stopped])
-    return np.array(rows, float).reshape(-1, 9)
+    for frame in suited(model, recording, "the recording"):
+        rows += [[*fields(model, e), frame.t] for e in classifier.push(frame)]
+    rows += [[*fields(model, e), frame.t] for e in classifier.finish()]
+    told = [row for row in rows if len(row) == FIELDS]
+    return np.array(told, float).reshape(-1, FIELDS)
+
+
+def fields(model, event):
+    """The numbers of an event; none of one that C does not tell."""
+    if isinstance(event, Onset | Release):
+        kind = float(isinstance(event, Release))
+        return [kind, event.onset_s, 0, -1, 0, 0, 0, 0, 0]
+    if not isinstance(event, Decided):
+        return []
+    labels = model.info.tasks[event.task].labels
+    label = -1 if event.label is None else labels.index(event.label)
+    flags = sum(1 << i for i, flag in enumerate(FLAGS) if flag in event.flags)
+    confidence = math.nan if event.confidence is None else event.confidence
+    decision = event.decision
+    nearest = 0 if decision is None else int(decision.neighbours[0])
+    stopped = (None, "confidence", "window").index(event.stopped_by)
+    task = list(model.info.tasks).index(event.task)
+    row = [2, event.onset_s, task, label, event.window_s, confidence, flags]
+    return [*row, nearest, stopped]

@@ -7,10 +7,8 @@
 
 #include <Wire.h>
 
-extern "C" {
 #include "baseline.h"
 #include "edge_classify.h"
-}
 
 const uint8_t PAD = 0x5A;       // the MPR121's address
 const uint8_t FILTERED = 0x04;  // 12 values of 10 bits, two bytes each
@@ -52,29 +50,43 @@ void setup() {
   }
   for (int i = 0; i < 12; i++) values[i] = uint16_t(sums[i] / REST_FRAMES);
   ec_baseline_begin(taxels, 12, values, 2000);
+  if (!ec_selftest()) Serial.println("compile with -ffp-contract=off");
   ec_begin();
 }
 
+void print(const ec_event *events, int count) {
+  for (int i = 0; i < count; i++) {
+    const ec_event &event = events[i];
+    if (event.kind != EC_DECIDED_EVENT) continue;
+    Serial.print(ec_task_names[event.task]);
+    Serial.print(": ");
+    Serial.print(event.label < 0 ? "unknown" : ec_labels[event.task][event.label]);
+    Serial.print(" ");
+    Serial.println(event.confidence, 2);
+  }
+}
+
+// A frame every 10 ms; between them a decision goes on, slice by slice.
 void loop() {
   static uint16_t counts[12];
   static ec_event events[EC_MOST_EVENTS];
+  static uint32_t next_ms = 0;
   uint16_t values[12];
-  const double t_s = millis() / 1e3;
-  if (read_pad(values)) {
-    // A touch lowers the MPR121's values; counts rise with it.
-    ec_baseline_above(taxels, 12, values, -1, 4, counts);
-    if (!ec_is_touched()) ec_baseline_follow(taxels, 12, values, nullptr, STEP);
-    const int count = ec_push(counts, nullptr, t_s, nullptr, events);
-    if (count == EC_BAD_TIME) ec_begin();  // millis() is 0 again after 50 days
-    for (int i = 0; i < count; i++) {
-      const ec_event &event = events[i];
-      if (event.kind != EC_DECIDED_EVENT) continue;
-      Serial.print(ec_task_names[event.task]);
-      Serial.print(": ");
-      Serial.print(event.label < 0 ? "unknown" : ec_labels[event.task][event.label]);
-      Serial.print(" ");
-      Serial.println(event.confidence, 2);
-    }
+  if (int32_t(millis() - next_ms) < 0) {
+    if (ec_is_due()) print(events, ec_work(events));
+    return;
   }
-  delay(10);
+  next_ms = millis() + 10;
+  if (!read_pad(values)) return;
+  const double t_s = millis() / 1e3;
+  // A touch lowers the MPR121's values; counts rise with it.
+  ec_baseline_above(taxels, 12, values, -1, 4, counts);
+  if (!ec_is_touched()) ec_baseline_follow(taxels, 12, values, nullptr, STEP);
+  int count = ec_push(counts, nullptr, t_s, nullptr, events);
+  if (count == EC_BAD_TIME) ec_begin();  // millis() is 0 again after 50 days
+  while (count == EC_BUSY) {             // a touch follows another at once
+    while (ec_is_due()) print(events, ec_work(events));
+    count = ec_push(counts, nullptr, t_s, nullptr, events);
+  }
+  print(events, count);
 }
