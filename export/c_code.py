@@ -335,8 +335,10 @@ def literal(value: object) -> str:
         return f"{{{', '.join(map(literal, value)) or '0'}}}"
     if not isinstance(value, float | np.floating):
         return str(int(value))  # type: ignore[call-overload]
+    if np.isnan(value):
+        return "(double)NAN"
     if np.isinf(value):
-        return "(double)INFINITY"
+        return "(double)INFINITY" if value > 0 else "-(double)INFINITY"
     return float(value).hex()
 
 
