@@ -99,8 +99,9 @@ class Curve:
 
 
 def board_logistic(x: Floats) -> Floats:
-    """The board's logistic function of each number."""
-    return np.asarray(np.vectorize(logistic, otypes=[np.float64])(x))
+    """The board's logistic function of each number; NaN stays NaN."""
+    curve = np.array([logistic(number) for number in x.ravel().tolist()])
+    return np.where(np.isnan(x), np.nan, curve.reshape(x.shape))
 
 
 @dataclass(frozen=True)
