@@ -25,8 +25,9 @@ def as_counts(frames: Array, scale: float | None) -> Counts:
             "frames hold values that are not finite; set them to 0 and mark the taxels "
             "in `valid`"
         )
-    low = frames.min(initial=0)
-    high = frames.max(initial=0)
+    # A float16 cannot be compared with the largest count.
+    low = float(frames.min(initial=0))
+    high = float(frames.max(initial=0))
     if low < 0:
         raise InputError(
             f"frames go down to {low:g}, but counts are above baseline: subtract the "

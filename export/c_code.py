@@ -427,6 +427,8 @@ def literal(value: object) -> str:
         return f"{{{', '.join(map(literal, value)) or '0'}}}"
     if not isinstance(value, float | np.floating):
         return str(int(value))  # type: ignore[call-overload]
+    if np.isnan(value):
+        return "(double)NAN"
     if np.isinf(value):
         return f"{'-' if value < 0.0 else ''}(double)INFINITY"
     return float(value).hex()

@@ -23,6 +23,7 @@ from skl2onnx.common.data_types import DoubleTensorType, Int64TensorType
 from edge.arrays import Booleans, Floats, Integers
 from edge.model.info import METADATA_KEY, ModelInfo
 from edge.model.metadata import to_json
+from edge.model.onnx_file import DIGEST, OPSET
 from export.build import Builder, project, widened
 from train.model.novelty import (
     CLIP,
@@ -35,9 +36,6 @@ from train.model.pipeline import ContactClassifier, FittedSpace, nearest_of_labe
 from train.model.stopping import SequentialClassifier
 
 IR_VERSION = 8
-OPSET = 18
-DIGEST = b"rX\n\x14edge-classify-digest\x12@"
-"""Begins the field of the digest in a ModelProto: an entry of metadata of 64 digits."""
 LARGEST = float(np.finfo(np.float64).max)
 Fitted = ContactClassifier | SequentialClassifier
 

@@ -20,11 +20,12 @@ from joblib.externals.loky import get_reusable_executor
 
 import train
 from edge.cli import main as edge_classify
+from edge.model.onnx_file import DIGEST
 from edge.recording import Recording
 from edge.saving import save
 from edge.touch.layout import SkinLayout
 from export.__main__ import main as export_main
-from export.graph import DIGEST, with_digest
+from export.graph import with_digest
 
 # Each run draws the same examples, so only a change can turn a test red; `EXPLORE=1`
 # draws others. There are no deadlines, because a busy machine must not turn a test red.

@@ -9,9 +9,11 @@ the service has not run for a minute.
 
 import argparse
 import hashlib
+import os
 import subprocess
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 
 from edge.commands.options import add_file
@@ -22,7 +24,7 @@ from edge.model.model import LARGEST_BYTES, Model
 from edge.model.verify import golden_of, verify
 from edge.skin.file import load
 from edge.touch.differences import differences
-from edge.writing import remove_leftovers, write_whole
+from edge.writing import lock, remove_leftovers, write_whole
 
 FORMER = ".former"
 """Ends the name of the model that was replaced."""
@@ -56,8 +58,33 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     )
 
 
+@contextmanager
+def alone(folder: Path) -> Iterator[None]:
+    """Let no other program install into a folder during the block.
+
+    Raises:
+        InputError: another program does.
+    """
+    with ExitStack() as stack:
+        with suppress(OSError):  # no such folder, or a system without locks
+            handle = os.open(folder, os.O_RDONLY)
+            stack.callback(os.close, handle)
+            try:
+                lock(handle)
+            except BlockingIOError:
+                raise InputError(
+                    f"{folder}: another program installs a model; wait until it has ended"
+                ) from None
+        yield
+
+
 def run(arguments: argparse.Namespace) -> int:
     """Install, or go back; 1 if the new model did not prove itself."""
+    with alone(arguments.to.parent):
+        return _exchange(arguments)
+
+
+def _exchange(arguments: argparse.Namespace) -> int:
     output = Output.of(arguments)
     target = arguments.to
     remove_leftovers(target.parent)

@@ -80,7 +80,7 @@ class OnnxRuntime:
         # One thread is fastest for models of this size.
         options.intra_op_num_threads = 1
         options.inter_op_num_threads = 1
-        options.log_severity_level = 3
+        options.log_severity_level = 4  # others print names out of the file
         # Converts the constants that are stored in float32 once. More would change
         # nothing.
         level = runtime.GraphOptimizationLevel.ORT_ENABLE_BASIC

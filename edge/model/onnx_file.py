@@ -19,10 +19,13 @@ OPERATORS = frozenset(
     "Where".split()
 )
 """The operators of an exported model, all of the standard domain."""
+OPSET = 18
+"""The version of ONNX's operators in an exported model."""
 MOST_NODES = 1000
 """An exported model has about 20 nodes, and 15 more for each task."""
 
 GRAPH = 7
+OPERATOR_SETS = 8
 METADATA = 14
 FUNCTIONS = 25
 """Fields of a ModelProto."""
@@ -46,9 +49,11 @@ EXTERNAL_DATA = 13
 DATA_LOCATION = 14
 """Fields of a TensorProto."""
 
+DIGEST = b"rX\n\x14edge-classify-digest\x12@"
+"""Begins the last field of an exported model: an entry of metadata of `DIGITS` digits,
+the SHA-256 of all bytes before. No model of an earlier version has it."""
 DIGITS = 64
-"""At the end of an exported model: the SHA-256 of all bytes before, which no model of an
-earlier version has."""
+DAMAGED = "was changed or damaged since its export; copy or export it again"
 
 UNUSUAL = "functions, inner graphs or sparse tensors"
 
@@ -72,6 +77,8 @@ class Contents:
 
     data: bytes
     """The whole file."""
+    intact: bool = True
+    """Whether its digest is there and right."""
     nodes: list[Node] = field(default_factory=list)
     tensors: dict[str, Message] = field(default_factory=dict)
     """{name of a constant: the fields of its TensorProto}."""
@@ -134,17 +141,19 @@ def read(data: bytes, name: str) -> Contents:
         InputError: it is not an ONNX model, or was changed since it was exported; the
             sentence names the file.
     """
+    signed = memoryview(data)[:-DIGITS]
     digits = data[-DIGITS:]
-    digest = hashlib.sha256(memoryview(data)[:-DIGITS]).hexdigest()
-    if digits.isalnum() and digits != digest.encode():
-        raise InputError(
-            f"{name}: was changed or damaged since its export; copy or export it again"
-        )
-    contents = Contents(data)
+    intact = digits == hashlib.sha256(signed).hexdigest().encode()
+    if not intact and (digits.isalnum() or bytes(signed[-len(DIGEST) :]) == DIGEST):
+        raise InputError(f"{name}: {DAMAGED}")
+    contents = Contents(data, intact)
     try:
         model = message_of(memoryview(data))
         if FUNCTIONS in model:
             contents.foreign.append(UNUSUAL)
+        versions = [fields.get(2) for fields in messages(model, OPERATOR_SETS)]
+        if versions != [[OPSET]]:
+            contents.foreign.append(f"operators of another version than {OPSET}")
         for entry in messages(model, METADATA):
             contents.metadata[text_of(entry, 1)] = text_of(entry, 2)
         for graph in messages(model, GRAPH):
@@ -201,3 +210,5 @@ def check(contents: Contents, name: str) -> None:
         raise InputError(
             f"{name}: has {reason}, as no exported model has; export it again"
         )
+    if not contents.intact:
+        raise InputError(f"{name}: {DAMAGED}")

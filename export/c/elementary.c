@@ -5,6 +5,7 @@
 #define PER_HALF_TURN 0.3183098861837907
 #define HALF_TURN 3.1416015625
 #define HALF_TURN_REST (-8.908910206761537e-6)
+#define LN2 0.6931471805599453
 #define LN2_HIGH 0.6931471803691238
 #define LN2_LOW 1.9082149292705877e-10
 #define SQRT_HALF 0.7071067811865476
@@ -101,10 +102,11 @@ double ec_log(double x) {
 double ec_logistic(double x) {
   double size = x < 0.0 ? -x : x;
   if (!(size < 700.0)) size = 700.0;
-  double power = ec_rint(size / LN2_HIGH);
-  double rest = (power * LN2_HIGH - size) + power * LN2_LOW;
+  int power = (int)(size / LN2);
+  double rest = (size - power * LN2_HIGH) - power * LN2_LOW;
+  if (rest < 0.0) rest = 0.0;
   double series = 1.0;
-  for (int n = 14; n > 0; n--) series = 1.0 + rest * series / n;
-  double small = series * ec_exp2(-(int)power);
-  return (x > 0.0 ? 1.0 : small) / (1.0 + small);
+  for (int n = 16; n > 0; n--) series = 1.0 + rest * series / n;
+  double odds = (series < 2.0 ? series : 2.0) * ec_exp2(power);
+  return 1.0 / (1.0 + (x > 0.0 ? 1.0 / odds : odds));
 }

@@ -32,6 +32,12 @@ def test_what_is_no_count_is_refused_with_the_remedy(value, sentence):
         as_counts(np.full((2, 3, 4), value), None)
 
 
+def test_half_precision_holds_counts_without_a_warning(recwarn):
+    frames = np.full((2, 3, 4), 2048.0, np.float16)
+    assert (as_counts(frames, None) == 2048).all()
+    assert len(recwarn) == 0
+
+
 def test_other_units_are_scaled_by_the_factor_that_is_given_and_kept(tmp_path):
     newtons = np.array([0.0, 0.25, 1.0, 6.5]).reshape(4, 1, 1)
     recording = Recording(np.arange(4.0), newtons)

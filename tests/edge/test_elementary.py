@@ -51,9 +51,18 @@ def test_a_logarithm_is_right_within_three_units_of_its_last_place():
 def test_a_logistic_curve_is_right_and_never_leaves_its_range():
     for x in [*RNG.uniform(-40.0, 40.0, 200), *RNG.uniform(-699.0, 0.0, 100)]:
         exact = 1 / (1 + mpmath.exp(-float(x)))
-        assert abs(logistic(float(x)) / exact - 1) < 5e-16
+        assert abs(logistic(float(x)) / exact - 1) < 4e-15
     assert [logistic(x) for x in (0.0, 1e9, math.inf)] == [0.5, 1.0, 1.0]
     assert all(0.0 < logistic(x) < 1e-300 for x in (-1e9, -math.inf, math.nan))
+
+
+def test_a_logistic_curve_never_falls():
+    """Nor where a power of two begins."""
+    begins = elementary.LN2 * np.arange(-50, 51)[:, None]
+    near = begins + np.spacing(begins) * np.arange(-200, 201)
+    x = np.sort(np.concatenate([near.ravel(), RNG.uniform(-40.0, 40.0, 20_000)]))
+    curve = [logistic(number) for number in x.tolist()]
+    assert (np.diff(curve) >= 0.0).all()
 
 
 @pytest.mark.parametrize(("name", "bound"), [("sin", 7e-16), ("cos", 1.4e-15)])

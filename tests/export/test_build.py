@@ -5,8 +5,8 @@ import onnx
 import pytest
 from onnx import TensorProto, helper
 
+from edge.model.onnx_file import OPSET
 from export.build import Builder
-from export.graph import OPSET
 from tests.hard_cases.models import session
 
 

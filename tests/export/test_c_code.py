@@ -439,3 +439,13 @@ def test_what_cannot_be_written_is_one_sentence_and_leaves_no_file(tmp_path):
     with pytest.raises(InputError, match="main.c: cannot be written"):
         c_code.export(model, folder)
     assert [path.name for path in folder.iterdir()] == ["main.c"]
+
+
+def test_every_float_has_a_literal():
+    values = [np.inf, -np.inf, np.nan, np.float32(0.5)]
+    assert [c_code.literal(value) for value in values] == [
+        "(double)INFINITY",
+        "-(double)INFINITY",
+        "(double)NAN",
+        "0x1.0000000000000p-1",
+    ]

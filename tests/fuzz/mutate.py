@@ -16,7 +16,7 @@ import numpy as np
 import onnx
 from onnx import numpy_helper
 
-from export.graph import DIGEST
+from edge.model.onnx_file import DIGEST
 from tests.conftest import sealed
 
 WORDS = (

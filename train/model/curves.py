@@ -14,6 +14,7 @@ from scipy.optimize import brentq
 from scipy.special import expit
 
 from edge.arrays import Booleans, Floats, Integers
+from edge.elementary import logistic
 
 PULL = 0.5
 """Weight of the prior of a margin's slope, 1 a standard deviation, and of the
@@ -94,7 +95,13 @@ class Curve:
     def probabilities(self, margins: Floats, excess: Floats) -> Floats:
         """That labels with these margins are right, in the shape of the margins."""
         logits = self.slope * margins + self.intercept - self.doubt * excess
-        return np.asarray(expit(logits))
+        return board_logistic(logits)
+
+
+def board_logistic(x: Floats) -> Floats:
+    """The board's logistic function of each number; NaN stays NaN."""
+    curve = np.array([logistic(number) for number in x.ravel().tolist()])
+    return np.where(np.isnan(x), np.nan, curve.reshape(x.shape))
 
 
 @dataclass(frozen=True)

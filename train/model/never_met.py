@@ -10,13 +10,14 @@ probability that the thing is known. Its curve is raised by half of that
 """
 
 import numpy as np
-from scipy.special import expit
 from sklearn.linear_model import LogisticRegression
 
 from edge.arrays import Booleans, Floats, Integers
+from edge.elementary import log
 from edge.model.info import Remoteness
 from train.data.folds import group_folds
 from train.data.vectors import Strings
+from train.model.curves import board_logistic
 from train.model.novelty import LEAST, UNKNOWN_RATE, limits_of
 
 SHARE = 0.1
@@ -69,7 +70,7 @@ def known_of(remoteness: Remoteness, scores: Floats) -> Floats:
     (`edge.model.info.Remoteness.known`), from their remoteness."""
     middles = np.array(remoteness.middles)[:, None]
     slopes = np.array(remoteness.slopes)[:, None]
-    return np.asarray(expit(slopes * np.log(middles / np.maximum(scores, TINY))))
+    return board_logistic(slopes * log(middles / np.maximum(scores, TINY)))
 
 
 def _curve(known: Floats, left_out: Floats) -> tuple[float, float]:

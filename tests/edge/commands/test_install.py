@@ -53,6 +53,13 @@ def test_a_verified_model_takes_the_place_of_the_former_one_which_is_kept(
     assert running.with_name("model.onnx.former").read_bytes() == b"former model"
 
 
+def test_only_one_program_at_a_time_installs_into_a_folder(installed, running):
+    with install.alone(running.parent):
+        assert installed()[0] == 2
+    assert running.read_bytes() == b"former model"
+    assert installed()[0] == 0
+
+
 def test_an_installed_model_is_verified_with_the_golden_file_beside_it(
     edge, installed, running
 ):

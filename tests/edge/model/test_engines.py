@@ -4,13 +4,15 @@ import logging
 import sys
 
 import numpy as np
+import onnx
 import pytest
+from onnx import numpy_helper
 
 import edge as edge_package
 from edge import demo
 from edge.errors import EdgeError, InputError
 from edge.model.model import Model
-from tests.conftest import ROOT
+from tests.conftest import ROOT, sealed
 
 MODELS = [demo.MODEL, ROOT / "tests" / "golden" / "model.onnx"]
 
@@ -49,6 +51,23 @@ def hostile(width, rng):
     odd[2, 0] = np.inf
     odd[3] = 1e308
     return np.concatenate([plain, far, odd])
+
+
+def test_names_of_a_file_reach_no_terminal_through_a_log(tmp_path, capfd):
+    """An index that is past its table only when the graph runs."""
+    proto = onnx.load(demo.MODEL)
+    for number, node in enumerate(proto.graph.node):
+        node.name = f"\x1b[2J{number}"
+    (labels,) = [t for t in proto.graph.initializer if t.name == "labels of object"]
+    far = numpy_helper.to_array(labels) + 500
+    labels.CopyFrom(numpy_helper.from_array(far.astype(np.int64), labels.name))
+    path = tmp_path / "model.onnx"
+    path.write_bytes(sealed(proto))
+    model = Model(path, "onnxruntime")
+    with pytest.raises(InputError) as refused:
+        model.decide(np.zeros(model.info.width))
+    output = str(refused.value), *capfd.readouterr()
+    assert "\x1b" not in "".join(output)
 
 
 @pytest.mark.parametrize("path", MODELS)

@@ -7,23 +7,26 @@ from onnx import TensorProto, helper, numpy_helper
 
 from edge.errors import InputError
 from edge.model import onnx_file
+from tests.conftest import sealed
 
 
-def check(data, name):
-    contents = onnx_file.read(data, name)
+def check(proto):
+    """The contents of a model that was sealed after its changes."""
+    name = "m.onnx"
+    contents = onnx_file.read(sealed(proto), name)
     onnx_file.check(contents, name)
     return contents
 
 
-def model(nodes, initial=(), **more):
+def model(nodes, initial=(), opset=onnx_file.OPSET, **more):
     """The bytes of a graph x -> y of these nodes."""
     sides = [
         helper.make_tensor_value_info(n, TensorProto.DOUBLE, [None, 2])
         for n in ("x", "y")
     ]
     graph = helper.make_graph(nodes, "g", sides[:1], sides[1:], list(initial))
-    opset = [helper.make_opsetid("", 18)]
-    return helper.make_model(graph, opset_imports=opset, **more)
+    imports = [helper.make_opsetid("", opset)]
+    return helper.make_model(graph, opset_imports=imports, **more)
 
 
 def add(name="Add", **attributes):
@@ -77,6 +80,14 @@ REFUSED = {
         weights_elsewhere(data_location=TensorProto.EXTERNAL),
         "weights in another file, as no",
     ),
+    "older operators": (
+        model([add()], opset=7),
+        "operators of another version than 18",
+    ),
+    "newer operators": (
+        model([add()], opset=99),
+        "operators of another version than 18",
+    ),
     "a path alone": (weights_elsewhere(), "weights in another file, as no"),
 }
 
@@ -84,12 +95,12 @@ REFUSED = {
 @pytest.mark.parametrize(("proto", "sentence"), REFUSED.values(), ids=REFUSED)
 def test_what_no_exported_model_has_is_refused(proto, sentence):
     with pytest.raises(InputError, match=rf"^m.onnx: has {sentence}"):
-        check(proto.SerializeToString(), "m.onnx")
+        check(proto)
 
 
 @pytest.mark.parametrize("value", [0.5, "text", [1, 2]], ids=str)
 def test_an_attribute_may_be_numbers_or_a_text(value):
-    contents = check(model([add(own=value)]).SerializeToString(), "m.onnx")
+    contents = check(model([add(own=value)]))
     assert contents.foreign == []
     assert [node.operator for node in contents.nodes] == ["Add"]
 
@@ -104,7 +115,7 @@ OTHER_ATTRIBUTES = {
 @pytest.mark.parametrize("value", OTHER_ATTRIBUTES.values(), ids=OTHER_ATTRIBUTES)
 def test_an_attribute_of_another_kind_is_refused(value):
     with pytest.raises(InputError, match=PARTS):
-        check(model([add(own=value)]).SerializeToString(), "m.onnx")
+        check(model([add(own=value)]))
 
 
 @pytest.mark.parametrize("data", ["38 05", "3a 04 0a 02 20 05"])
@@ -114,3 +125,12 @@ def test_a_number_where_bytes_belong_is_no_model(data):
         InputError, match=r"^m.onnx: not an ONNX model; copy or export it again"
     ):
         onnx_file.read(bytes.fromhex(data), "m.onnx")
+
+
+def test_any_damaged_byte_of_the_digest_is_damage():
+    data = sealed(model([add()]))
+    for place in range(1, onnx_file.DIGITS + len(onnx_file.DIGEST) + 1):
+        for byte in (b"_", b"z", b"\0"):
+            damaged = data[:-place] + byte + data[len(data) - place + 1 :]
+            with pytest.raises(InputError):
+                onnx_file.check(onnx_file.read(damaged, "m.onnx"), "m.onnx")
