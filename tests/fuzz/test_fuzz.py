@@ -110,7 +110,7 @@ DIGITS = "has 5000 digits; use sys.set_int_max_str_digits() to increase the limi
 BROKE = {
     "arm-deep.toml": "it is nested too deeply",
     "arm-digits.toml": DIGITS,
-    "csv_frames-utf8.one": "line 2 has 1 value, and the first row 2",
+    "csv_frames-utf8.one": "labels.csv: needs a column file",
     "model-gather.onnx": "indices element out of data bounds, idx=99 must be",
     "recording-token.npz": "('EOF in multi-line statement', (2, 0)); copy or record it again",
     "rosbag-header.bag": "Header field could not be parsed.; copy it again",
