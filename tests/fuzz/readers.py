@@ -205,6 +205,16 @@ TABLES = [
 ]
 """A trial of a sensor whose values fall, and two trials with a value a row."""
 
+LOGS = [
+    b'{"t": 0.0, "p": [1, 2]}\n{"t": 0.1, "p": [3, 4]}\n',
+    b'{"payload": {"interval_ms": 10, "sensors": [{"name": "s1"}], "values": [[1], [2]]}}',
+    b"SECONDS_PER_FRAME 0.01\nFrame 1\n1,B\n3,4\nFrame 2\n5,6\n7,8\n",
+    b"CLEARDATA\nLABEL,Time,p1,millis\nDATA,TIME,1,0\nDATA,TIME,2,10\n",
+    b"1700000000,0,skin,1,2\n1700000000,10000000,skin,3,4\n",
+    b"12:00:00.000 -> s1:1\ts2:2\n12:00:00.010 -> s1:3\ts2:4\n",
+]
+"""A file of each form that is no table."""
+
 READERS = (
     Reader(
         "recording",
@@ -249,6 +259,7 @@ READERS = (
     ),
     Reader("sdh2", ".xml", lambda: [dsa().encode()], mutate.of_text, read_grasp),
     Reader("csv", ".csv", lambda: TABLES, mutate.of_text, importing("csv", "--falls")),
+    Reader("forms", ".txt", lambda: LOGS, mutate.of_text, importing("csv")),
     Reader("csv_frames", ".one", lambda: FRAME_FILES, of_frames, read_frames),
     Reader("mcap", ".mcap", logs, mutate.of_bytes, importing("rosbag")),
     Reader("rosbag", ".bag", bags, mutate.of_bytes, importing("rosbag")),

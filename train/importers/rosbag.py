@@ -27,6 +27,7 @@ FOOTER_RECORD = 2
 SCHEMA = 3
 CHANNEL = 4
 LARGEST_RECORD = 1 << 24
+LARGEST_FILE = 1 << 48
 FOOTER = 37
 """Bytes of the last record and of the magic behind it."""
 
@@ -74,7 +75,7 @@ def _require_messages_of_ros(path: Path) -> None:
         if len(footer.getvalue()) < FOOTER or not footer.getvalue().endswith(MAGIC):
             return
         footer.seek(9)
-        file.seek(min(footer.number(8), sys.maxsize // 2) or len(MAGIC))
+        file.seek(min(footer.number(8), LARGEST_FILE) or len(MAGIC))
         schemas = {0: "no schema"}
         others = {}
         for code, content in _records(file):
@@ -117,7 +118,7 @@ def _records(file: BinaryIO) -> Iterator[tuple[int, Content]]:
         size = int.from_bytes(file.read(8), "little")
         if code in (HEADER, SCHEMA, CHANNEL):
             yield code, Content(file.read(min(size, LARGEST_RECORD)))
-        elif code == FOOTER_RECORD or size > sys.maxsize // 2:
+        elif code == FOOTER_RECORD or size > LARGEST_FILE:
             return
         else:
             file.seek(size, os.SEEK_CUR)

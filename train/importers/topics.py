@@ -169,6 +169,11 @@ class Log:
             samples = replace(samples, joints=joints)
             if isinstance(names[0], str):
                 meta["joint_names"] = names
+        stamp = "as logged" if times == "logged" else "of the messages"
+        say(
+            f"frames: {topic}, joint angles: {joints_topic or 'none'}, time: {stamp}, "
+            f"labels: {meta['labels'] or 'none'} of {self.path.stem}.json"
+        )
         if axes is not None:
             say(axes.text)
         shape = skin_shape(samples, self._stated_shape(values.shape[1:]), self.options)

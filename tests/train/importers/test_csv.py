@@ -107,13 +107,6 @@ def test_the_same_trial_comes_out_of_every_form(form, folder):
     assert trial.labels == {"object": "cup"}
 
 
-def test_a_file_of_values_by_their_sensors_is_a_trial(folder):
-    rows = [(t, i, 10 * t + i) for t in (0, 10) for i in (1, 0)]
-    put(folder, {"cup_1.csv": text(rows, head="timestamp_ms,sensor_id,value")})
-    _, recordings = imported(folder)
-    assert recordings["cup_1"].frames.tolist() == [[[0, 1]], [[100, 101]]]
-
-
 def test_the_lines_of_pandas_make_a_recording(folder, refused):
     put(folder, {"cup_1.csv": "t,thumb,index\n0,1,2\n0.1,3,4\n"})
     refused("csv", folder)
@@ -148,12 +141,6 @@ def table(folder, rows, *words):
     _, recordings = imported(folder, *words)
     (trial,) = recordings.values()
     return trial.frames.reshape(len(trial.t), -1).tolist(), trial.joints
-
-
-def test_a_row_of_numbers_and_empty_cells_is_no_header(folder):
-    rows = "0.00,7,,8,\n0.01,7,9,8,\n0.02,5,6,4,\n"
-    frames, _ = table(folder, rows, "--time", "1", "--taxels", "2-4")
-    assert frames == [[7, 0, 8], [7, 9, 8], [5, 6, 4]]
 
 
 def test_names_in_the_comment_stand_above_texts_too(folder):

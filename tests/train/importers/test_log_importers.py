@@ -166,6 +166,12 @@ def test_arrays_of_floats_are_scaled_into_frames(bag, imported):
     assert np.array_equal(recording.frames, counts)
 
 
+def test_what_was_taken_from_where_is_said(bag, imported, capsys):
+    imported(bag(skin(), joints(), beside=BESIDE))
+    line = "frames: /skin, joint angles: /joint_states, time: of the messages"
+    assert line in capsys.readouterr().out
+
+
 def test_a_bag_may_be_the_current_folder(bag, tmp_path, monkeypatch):
     monkeypatch.chdir(bag(skin()))
     out = str(tmp_path / "out")

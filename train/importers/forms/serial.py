@@ -15,9 +15,9 @@ PAIR = re.compile(r"([^\W\d][\w ]*?)\s*[:=]\s*([-+]?[\d.]+)(?=[\s,;]|\Z)")
 
 def is_form(file: File) -> bool:
     """Whether the first lines have stamps, or consist of pairs."""
-    lines = file.head.split("\n")[1:]
+    lines = file.head.split("\n")
     odd = [line for line in lines if not (STAMP.match(line) or len(_names(line)) > 1)]
-    return len(lines) > 1 and len(odd) <= 1
+    return len(odd) <= 1 < len(lines) - len(odd)
 
 
 def _names(line: str) -> list[str]:
