@@ -84,7 +84,7 @@ CLAIMS = {
     "microcontroller: but never flagged `short`": "export/test_c_code.py::test_the_demo_has",
     "recipes: it prints five lines of pandas": "train/importers/test_csv.py::test_the_lines_of",
     "recipes: at the full window, flagged `uncer": "export/test_early_stopping.py::test_a_task",
-    "recipes: Otherwise category is flagged": "edge/test_early.py::test_a_product_that_is_not",
+    "recipes: Where none is certified at your": "edge/test_early.py::test_a_task_that_is_not",
     "recipes: - `unsure` flags a decision that": "export/test_early_stopping.py::test_a_stream",
     "recipes: `unusual` flags a touch unlike": "export/test_early_stopping.py::test_a_touch_un",
     "recipes: `unknown` flags a thing that": "export/test_early_stopping.py::test_an_unknown",

@@ -118,7 +118,7 @@ def _records(file: BinaryIO) -> Iterator[tuple[int, Content]]:
         size = int.from_bytes(file.read(8), "little")
         if code in (HEADER, SCHEMA, CHANNEL):
             yield code, Content(file.read(min(size, LARGEST_RECORD)))
-        elif code == FOOTER_RECORD or size > LARGEST_FILE:
+        elif code == FOOTER_RECORD or size > LARGEST_FILE - file.tell():
             return
         else:
             file.seek(size, os.SEEK_CUR)

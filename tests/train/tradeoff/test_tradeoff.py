@@ -9,8 +9,6 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from matplotlib import rc_context
-from matplotlib.figure import Figure
 
 from edge.errors import InputError
 from edge.model.info import Stopping, StoppingRule
@@ -27,7 +25,6 @@ from train.commands.tradeoff import cost
 from train.data.dataset import Recordings, read
 from train.data.parts import part
 from train.model.rules import NEVER, Course
-from train.report.figures import STYLE
 from train.report.work import Workers
 from train.tradeoff import answer, board, choices, costs, early
 from train.tradeoff import run as running
@@ -361,15 +358,3 @@ def test_each_change_and_the_front_of_quick_choices_lie_beside_the_report(writte
     assert front.task == "category"
     assert front.quick
     assert front.points[-1].accuracy > 0.9
-
-
-def test_the_bar_names_the_milliseconds_as_they_are():
-    parts = SimpleNamespace(arithmetic_s=0.0006)
-    mine = SimpleNamespace(points={1.2: {}}, after_s=0.0009, wire_s=0.0003, board=parts)
-    with rc_context(STYLE):
-        figure = Figure()
-        answer._split(figure, mine)
-        figure.draw_without_rendering()
-    axis = figure.axes[1].xaxis
-    assert axis.get_offset_text().get_text() == ""
-    assert "1200.50" in [text.get_text() for text in axis.get_ticklabels()]
