@@ -203,7 +203,8 @@ class Choosing:
         """Each task's settings."""
         vectors = self._vectors(window_s)
         protocols = self._protocols(vectors, "choosing", nested=True)
-        trials, groups = protocols.trials, protocols.groups
+        trials = protocols.trials
+        groups = protocols.groups
         chosen = {}
         without_trials = {}
         for task in self._y:
