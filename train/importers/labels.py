@@ -19,7 +19,9 @@ from train.importers.options import TableOptions
 from train.importers.table import Table
 
 LABELS = "labels.csv"
-LABEL = re.compile(r"labels?|class(?:[ _]?name)?|category|target|object|material", re.I)
+LABEL = re.compile(
+    r"\A(?:labels?|class(?:[ _]?name)?|category|target|object|material)\Z", re.I
+)
 """Names of a column that holds labels."""
 NUMBERED = re.compile(r"(?:trial|rec|recording|run|take|sample|test)?[\s_.-]*\d+", re.I)
 """Names of folders that only count trials."""
@@ -126,22 +128,19 @@ def labels_of(
         raise InputError(
             f"{path}: needs a column file with names such as {short_text(names)}"
         )
-    slips = [
-        f"{path}: {name} names no file"
-        for name in rows
-        if name not in {*names, *others}
-    ]
+    left_out = {name for name, row in rows.items() if row.pop("left_out", "")}
+    slips = [f"{name} names no file" for name in rows.keys() - {*names, *others}]
     slips += [
-        f"{path}: has no row for {name}, which has no label"
+        f"has no row for {name}, which has no label"
         for name in names
         if name not in rows
     ]
-    table = []
-    for place in places:
-        row = dict(rows.get(place.name, {}))
-        table.append({**place.labels, **row})
-    left_out = {name for name, row in rows.items() if row.pop("left_out", "")}
-    return Labels(table, LABELS, slips=slips, left_out=frozenset(left_out))
+    return Labels(
+        [{**place.labels, **rows.get(place.name, {})} for place in places],
+        LABELS,
+        slips=[f"{path}: {slip}" for slip in sorted(slips)],
+        left_out=frozenset(left_out),
+    )
 
 
 def read_rows(path: Path) -> dict[str, dict[str, str]]:
@@ -177,21 +176,16 @@ def _told(places: Sequence[Place], options: TableOptions) -> Labels:
         return _stated(places, options.label, options.task)
     if any(place.label for place in places):
         return Labels([place.labels for place in places], places[0].label)
-    columns = {}
-    for name in dict.fromkeys(name for place in places for name in place.texts):
-        if _is_label(name, [place.texts.get(name) for place in places], places):
-            columns[name] = options.task if LABEL.fullmatch(name) else name
+    columns = [
+        name
+        for name in dict.fromkeys(name for place in places for name in place.texts)
+        if _is_label(name, [place.texts.get(name) for place in places], places)
+    ]
     if not columns:
         return _by_name(places, options.task)
-    of = []
-    for place in places:
-        of.append(
-            {
-                task: place.texts[name]
-                for name, task in columns.items()
-                if name in place.texts
-            }
-        )
+    table = pd.DataFrame([place.texts for place in places])[columns]
+    table = table.rename(columns=lambda name: LABEL.sub(options.task, name))
+    of = [row.dropna().to_dict() for _, row in table.iterrows()]
     return Labels(of, f"column {', column '.join(columns)}", frozenset(columns))
 
 
