@@ -29,6 +29,8 @@ LABEL_AND_ID = re.compile(r"([^.]*[^\W\d_][^.]*)\.[\w.-]+")
 """A name of Edge Impulse: LABEL.ID, or LABEL.ID.MORE."""
 COUNT = r"[\s_.-]*\(?\d+\)?$"
 """A number at the end of a name."""
+NO_TEXT = "\0"
+"""Stands for a text where a trial has no such column."""
 FEWEST_ALONE = 3
 """Trials that may all have another label."""
 NONE = "none, as the files' names only count"
@@ -176,26 +178,24 @@ def _told(places: Sequence[Place], options: TableOptions) -> Labels:
         return _stated(places, options.label, options.task)
     if any(place.label for place in places):
         return Labels([place.labels for place in places], places[0].label)
-    columns = [
-        name
-        for name in dict.fromkeys(name for place in places for name in place.texts)
-        if _is_label(name, [place.texts.get(name) for place in places], places)
-    ]
+    texts = pd.DataFrame([dict(place.texts) for place in places], dtype=object)
+    columns = [name for name in texts if _is_label(name, texts[name], places)]
     if not columns:
         return _by_name(places, options.task)
-    table = pd.DataFrame([place.texts for place in places])[columns]
+    table = texts[columns]
     table = table.rename(columns=lambda name: LABEL.sub(options.task, name))
     of = [row.dropna().to_dict() for _, row in table.iterrows()]
     return Labels(of, f"column {', column '.join(columns)}", frozenset(columns))
 
 
-def _is_label(name: str, texts: Sequence[str | None], places: Sequence[Place]) -> bool:
+def _is_label(name: str, column: pd.Series, places: Sequence[Place]) -> bool:
     """Whether a column of texts is one of labels: it is called so, or some of its texts
     are those of several trials.
 
     Raises:
         InputError: it is called so, and changes within a trial.
     """
+    texts = [*column.fillna(NO_TEXT)]
     different = set(texts)
     is_called = bool(LABEL.fullmatch(name))
     if "" in different:
@@ -203,7 +203,7 @@ def _is_label(name: str, texts: Sequence[str | None], places: Sequence[Place]) -
             f"{places[texts.index('')].path}: column {name} changes within the file; part "
             "it there, or tell labels otherwise, such as by --label 1 or --label folder"
         )
-    if all(text is None or is_number(text) for text in texts):
+    if all(text == NO_TEXT or is_number(text) for text in texts):
         return is_called and len(different) > 1
     return is_called or 1 < len(different) < len(texts)
 

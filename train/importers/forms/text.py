@@ -124,10 +124,10 @@ def _table(where: str, lines: Sequence[str], form: Sequence[str]) -> Table:
         name or unnamed.format(place) for place, name in zip_longest(places, names)
     ]
     require_unique(unique)
-    is_comma = mark != "," and any(re.search(COMMA, row.text) for row in data)
-    if is_comma:
+    decimal = _decimal(data, mark)
+    if decimal == ",":
         notes.append("decimal commas")
-    table = _parsed(data, unique, mark, "," if is_comma else ".")
+    table = _parsed(data, unique, mark, decimal)
     # A separator at the ends of rows makes a column without a name or a value.
     named = set(names or unique[:-1])
     empty = table.columns[table.isna().all()].difference(named)
@@ -139,6 +139,13 @@ def _table(where: str, lines: Sequence[str], form: Sequence[str]) -> Table:
         file_names=tuple(unique),
         units=dict(zip(unique, units, strict=False)),
     )
+
+
+def _decimal(rows: Sequence[Row], mark: str) -> str:
+    """The sign before a fraction."""
+    if mark != "," and any(re.search(COMMA, row.text) for row in rows):
+        return ","
+    return "."
 
 
 def _head_note(lines: Sequence[str], rows: Sequence[Row]) -> str:
