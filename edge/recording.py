@@ -170,10 +170,7 @@ def checked(path: str, recording: Recording, scale: float | None = None) -> Reco
             raise InputError("meta.skin says axes = 3, but shear is missing")
         if "labels" in meta:
             meta["labels"] = read_labels(path, meta["labels"])
-        if meta.get("onset") is not None:
-            _check_onset(meta["onset"])
-        if meta.get("joint_names") is not None:
-            _check_joint_names(meta["joint_names"], joints)
+        _check_meta(meta, joints)
     return Recording(t, frames, joints, recording.valid, meta, recording.shear)
 
 
@@ -278,10 +275,13 @@ def read_labels(path: str, values: Any) -> dict[str, str]:
     return labels
 
 
-def _check_onset(onset: Any) -> None:
-    table = ConfigTable(onset, "meta.onset")
-    table.choice("source", ONSETS)
-    table.numbers("times_s")
+def _check_meta(meta: Mapping[str, Any], joints: Floats | None) -> None:
+    if meta.get("joint_names") is not None:
+        _check_joint_names(meta["joint_names"], joints)
+    if meta.get("onset") is not None:
+        onset = ConfigTable(meta["onset"], "meta.onset")
+        onset.choice("source", ONSETS)
+        onset.numbers("times_s")
 
 
 def _check_joint_names(names: Any, joints: Floats | None) -> None:

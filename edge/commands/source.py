@@ -236,12 +236,10 @@ def reading(
     dof = None
     if arm is None and model is not None:
         arm = model.info.chain
-        dof = model.info.dof
+        dof = _angles(model)
     if arm is not None:
         names = arm.names
         dof = arm.dof
-    if dof is None and model is not None and model.info.onset:
-        dof = 0
     if arguments.fake is not None:
         arguments.real_time |= real_time or arguments.web is not None
     played_names = names if arguments.joints is None else None
@@ -253,18 +251,10 @@ def reading(
         if model is not None and needs_joints and arguments.joints is None:
             model.require_joints(opened.dof, opened.source)
         joints = stack.enter_context(_joints(arguments.joints, opened, dof, names))
-        onsets: Joints | Playback | None = joints or opened.playback
-        if model is None or not model.info.onset:
-            onsets = None
-        elif onsets is None:
-            raise InputError(
-                "the model's touches begin by an event: give --joints stdin or udp:PORT, "
-                'with a line {"onset": true} for each'
-            )
         loop = Loop(
             opened.skin,
-            joints=None if dof == 0 else joints,
-            onsets=onsets,
+            joints=joints,
+            onsets=_onsets(model, joints, opened),
             lasts_s=opened.lasts_s,
             stop=stop,
         )
@@ -283,6 +273,30 @@ def _page(
     from edge.tools.page import open_page  # few runs have a page
 
     return open_page(address, opened.skin.layout, title=opened.source, **options)
+
+
+def _angles(model: Model) -> int | None:
+    """The joint angles that a line must have: none in a stream of onsets alone."""
+    return 0 if model.info.dof is None and model.info.onset else model.info.dof
+
+
+def _onsets(
+    model: Model | None, joints: Joints | Playback | None, opened: Opened
+) -> Joints | Playback | None:
+    """What tells the onsets of a model whose touches begin by an event.
+
+    Raises:
+        InputError: nothing does.
+    """
+    if model is None or not model.info.onset:
+        return None
+    source = joints or opened.playback
+    if source is None:
+        raise InputError(
+            "the model's touches begin by an event: give --joints stdin or udp:PORT, "
+            'with a line {"onset": true} for each'
+        )
+    return source
 
 
 def _joints(

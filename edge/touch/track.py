@@ -155,10 +155,10 @@ class ContactTracker:
     def _follow_from_outside(self, frame: Frame, active: ActiveTaxels) -> list[Contact]:
         """As `push`, where frames tell the onsets."""
         region = self.region
-        ended = self.end() if frame.onset else []
+        ended: list[Contact] = []
         if frame.onset:
-            chain = None if self._is_on_skin(frame) else self._chain
-            self.contacts = [Contact(frame.t, region, self._measurer, chain)]
+            ended = self.end()
+            self.contacts = [self._begin(frame, region)]
         for contact in self.contacts:
             age_s = max(region_time(frame, region) - contact.onset_s, 0.0)
             if frame.onset or contact.age_s < self.horizon_s:
@@ -205,12 +205,9 @@ class ContactTracker:
         # The one contact is the largest region, wherever it lies.
         return [largest], dict.fromkeys(self.contacts, largest)
 
-    def _is_on_skin(self, frame: Frame) -> bool:
-        """Whether the motion of a contact that begins is measured on the skin."""
-        return self.motion_on_skin and frame.joints is None
-
-    def _begin(self, frame: Frame, region: Region) -> Contact:
-        chain = None if self._is_on_skin(frame) else self._chain
+    def _begin(self, frame: Frame, region: Region | None) -> Contact:
+        on_skin = self.motion_on_skin and frame.joints is None
+        chain = None if on_skin else self._chain
         return Contact(region_time(frame, region), region, self._measurer, chain)
 
     def _follow(

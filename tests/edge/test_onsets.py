@@ -1,10 +1,12 @@
 """Onsets from outside: recorded, trained on, and taken from another program."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import pytest
 
 import edge
+from edge.commands import source
 from edge.errors import InputError
 from tests.conftest import export, save_touches
 from tests.edge.test_classifier import decided
@@ -13,8 +15,8 @@ EARLY_S = 0.1
 """From the event to the touch, which begins at 0.2 s."""
 
 
-def with_onset(recording, source="event"):
-    onset = {"source": source, "times_s": [float(recording.t[0]) + EARLY_S]}
+def with_onset(recording):
+    onset = {"source": "event", "times_s": [float(recording.t[0]) + EARLY_S]}
     return replace(recording, meta={**recording.meta, "onset": onset})
 
 
@@ -73,3 +75,12 @@ def test_an_onset_that_is_none_is_refused(make_touch, tmp_path, onset):
     touch.meta["onset"] = onset
     with pytest.raises(InputError, match="meta.onset"):
         edge.save(tmp_path / "a.npz", touch)
+
+
+def test_a_run_without_a_source_of_events_is_refused(of_events):
+    opened = SimpleNamespace(playback=None)
+    with pytest.raises(InputError, match="--joints stdin"):
+        source._onsets(of_events, None, opened)
+    assert source._onsets(None, None, opened) is None
+    of_skin = SimpleNamespace(info=SimpleNamespace(dof=None, onset="event"))
+    assert source._angles(of_skin) == 0

@@ -134,33 +134,39 @@ def _files(path: Path, options: TableOptions) -> list[Path]:
         for place in sorted(path.rglob("*"))
         if not any(part.startswith(".") for part in place.relative_to(path).parts)
     ]
-    if options.frames:
-        files = [place for place in visible if place.is_dir() and any(place.iterdir())]
-    else:
-        files = [
-            place
-            for place in visible
-            if inner(place).suffix.lower() in SUFFIXES
-            and place.name not in (TABLE, SKIN, "info.labels")
-        ]
+    is_trial = _has_files if options.frames else _may_be_table
+    files = list(filter(is_trial, visible))
     if files:
         return files
-    kinds = [place.suffix.lower() for place in visible]
-    for place, kind in zip(visible, kinds, strict=True):
-        if kind in unread.KINDS:
-            raise InputError(f"{place}: is {unread.KINDS[kind]}")
+    for place in visible:
+        if place.suffix.lower() in unread.KINDS:
+            raise InputError(f"{place}: is {unread.kind_of(place.suffix)}")
     words = f"file {', '.join(SUFFIXES)}, or folder of them with --frames"
     raise InputError(f"{path}: holds no {words}; give a folder of trials")
+
+
+def _has_files(place: Path) -> bool:
+    return place.is_dir() and any(path.is_file() for path in place.iterdir())
+
+
+def _may_be_table(place: Path) -> bool:
+    is_known = inner(place).suffix.lower() in SUFFIXES
+    return is_known and place.name not in (TABLE, SKIN, "info.labels")
+
+
+def _name(place: Path) -> str:
+    """The name of the trial in a file, by its path from the folder of all."""
+    return "_".join(inner(place).with_suffix("").parts)
 
 
 def _measured(path: Path, folder: Path, options: TableOptions) -> Iterator[Any]:
     """The trials in a file or folder of frames whose columns are understood, and why
     others are not."""
     place = path.relative_to(folder)
-    parts = place.parts if options.frames else inner(place).with_suffix("").parts
+    name = "_".join(place.parts) if options.frames else _name(place)
     tables = frames.tables if options.frames else tables_in
     for table in tables(path, options):
-        named = replace(table, name=table.name or "_".join(parts))
+        named = replace(table, name=table.name or name)
         yield from _tried(map(_understood, [named], [place], [options]), options.strict)
 
 
@@ -244,10 +250,7 @@ def _recorded(
     them; prints the columns used and ignored."""
     kind = mode(trial.meaning.kind for trial in measured)
     usable = [trial for trial in measured if trial.meaning.kind == kind]
-    others = {
-        "_".join(inner(p.relative_to(folder)).with_suffix("").parts)
-        for p in folder.rglob("*")
-    }
+    others = [_name(place.relative_to(folder)) for place in folder.rglob("*")]
     labels = labels_of([trial.place for trial in measured], folder, options, others)
     yield from map(Refused, labels.slips)
     skin = json_table(folder / SKIN)
@@ -264,24 +267,24 @@ def _recorded(
                 f"{trial.samples.where}: has {trial.meaning.kind:.80}, and most have "
                 f"{kind:.80}; see --taxels and --time-unit"
             )
-        meta: dict[str, Any] = {
-            "skin": skin.raw,
-            "labels": dict(labels),
-            "source": source,
-            "trial": trial.place.name,
-        }
-        if trial.samples.joints is not None:
-            meta["arm"] = arm and arm.to_dict()
-        if options.onset or options.onset_column:
-            meta["onset"] = {
-                "source": options.onset or "event",
-                "times_s": trial.onsets,
-            }
+        meta = _meta(trial, arm, options)
+        meta |= {"skin": skin.raw, "labels": dict(labels), "source": source}
         return Trial(trial.place.name, rest.recording(trial.samples, shape, meta))
 
     for trial, trial_labels in zip(measured, labels.of, strict=True):
         if trial.place.name not in labels.left_out:
             yield from _tried(map(recorded, [trial], [trial_labels]), options.strict)
+
+
+def _meta(trial: Measured, arm: Chain | None, options: TableOptions) -> dict[str, Any]:
+    """What a recording says of a trial beside its skin and labels."""
+    meta: dict[str, Any] = {"trial": trial.place.name}
+    if trial.samples.joints is not None:
+        meta["arm"] = arm and arm.to_dict()
+    if options.onset or options.onset_column:
+        source = options.onset or "event"
+        meta["onset"] = {"source": source, "times_s": trial.onsets}
+    return meta
 
 
 def _announced(

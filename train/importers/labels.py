@@ -17,7 +17,9 @@ from train.importers.forms.text import is_number
 from train.importers.options import TableOptions
 from train.importers.table import Table
 
-LABEL = re.compile(r"labels?|class(?:[ _]?name)?|category|target|object|material", re.I)
+LABEL = re.compile(
+    r"\A(?:labels?|class(?:[ _]?name)?|category|target|object|material)\Z", re.I
+)
 """Names of a column that holds labels."""
 NUMBERED = re.compile(r"(?:trial|rec|recording|run|take|sample|test)?[\s_.-]*\d+", re.I)
 """Names of folders that only count trials."""
@@ -25,6 +27,8 @@ LABEL_AND_ID = re.compile(r"([^.]*[^\W\d_][^.]*)\.[\w.-]+")
 """A name of Edge Impulse: LABEL.ID, or LABEL.ID.MORE."""
 COUNT = r"[\s_.-]*\(?\d+\)?$"
 """A number at the end of a name."""
+NO_TEXT = "\0"
+"""Stands for a text where a trial has no such column."""
 FEWEST_ALONE = 3
 """Trials that may all have another label."""
 NONE = "none, as the files' names only count"
@@ -154,31 +158,24 @@ def _told(places: Sequence[Place], options: TableOptions) -> Labels:
         return _stated(places, options.label, options.task)
     if any(place.label for place in places):
         return Labels([place.labels for place in places], places[0].label)
-    columns = {}
-    for name in dict.fromkeys(name for place in places for name in place.texts):
-        if _is_label(name, [place.texts.get(name) for place in places], places):
-            columns[name] = options.task if LABEL.fullmatch(name) else name
+    texts = pd.DataFrame([dict(place.texts) for place in places], dtype=object)
+    columns = [name for name in texts if _is_label(name, texts[name], places)]
     if not columns:
         return _by_name(places, options.task)
-    of = []
-    for place in places:
-        of.append(
-            {
-                task: place.texts[name]
-                for name, task in columns.items()
-                if name in place.texts
-            }
-        )
+    table = texts[columns]
+    table = table.rename(columns=lambda name: LABEL.sub(options.task, name))
+    of = [row.dropna().to_dict() for _, row in table.iterrows()]
     return Labels(of, f"column {', column '.join(columns)}", frozenset(columns))
 
 
-def _is_label(name: str, texts: Sequence[str | None], places: Sequence[Place]) -> bool:
+def _is_label(name: str, column: pd.Series, places: Sequence[Place]) -> bool:
     """Whether a column of texts is one of labels: it is called so, or some of its texts
     are those of several trials.
 
     Raises:
         InputError: it is called so, and changes within a trial.
     """
+    texts = [*column.fillna(NO_TEXT)]
     different = set(texts)
     is_called = bool(LABEL.fullmatch(name))
     if "" in different:
@@ -186,7 +183,7 @@ def _is_label(name: str, texts: Sequence[str | None], places: Sequence[Place]) -
             f"{places[texts.index('')].path}: column {name} changes within the file; part "
             "it there, or tell labels otherwise, such as by --label 1 or --label folder"
         )
-    if all(text is None or is_number(text) for text in texts):
+    if all(text == NO_TEXT or is_number(text) for text in texts):
         return is_called and len(different) > 1
     return is_called or 1 < len(different) < len(texts)
 

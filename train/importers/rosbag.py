@@ -76,18 +76,7 @@ def _require_messages_of_ros(path: Path) -> None:
             return
         footer.seek(9)
         file.seek(min(footer.number(8), LARGEST_FILE) or len(MAGIC))
-        schemas = {0: "no schema"}
-        others = {}
-        for code, content in _records(file):
-            number = content.number(2)
-            if code == SCHEMA:
-                schemas[number] = content.string()
-            elif code == CHANNEL:
-                schema = schemas.get(content.number(2), "no schema")
-                topic = content.string()
-                encoding = content.string()
-                if encoding != "cdr":
-                    others[encoding] = f"{schema} on {topic}"
+        others = _other_encodings(file)
     if others or profile != "ros2":
         kinds = [f"{encoding} ({of})" for encoding, of in others.items()]
         raise InputError(
@@ -95,6 +84,23 @@ def _require_messages_of_ros(path: Path) -> None:
             "are not read; write the values as a table, for `import csv` (in Python the "
             "package mcap reads them), or record it anew with ros2 bag"
         )
+
+
+def _other_encodings(file: BinaryIO) -> dict[str, str]:
+    """{encoding: a schema and its topic} of channels, but for that of ROS 2."""
+    schemas = {0: "no schema"}
+    others = {}
+    for code, content in _records(file):
+        number = content.number(2)
+        if code == SCHEMA:
+            schemas[number] = content.string()
+        elif code == CHANNEL:
+            schema = schemas.get(content.number(2), schemas[0])
+            topic = content.string()
+            encoding = content.string()
+            if encoding != "cdr":
+                others[encoding] = f"{schema} on {topic}"
+    return others
 
 
 class Content(io.BytesIO):

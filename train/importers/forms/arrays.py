@@ -290,6 +290,11 @@ def _trials(stored: Arrays) -> list[Arrays]:
     keys = {frozenset(value) if isinstance(value, dict) else None for value in values}
     if len(values) > 1 and len(keys) == 1 and None not in keys:
         return values
+    return _entries(stored)
+
+
+def _entries(stored: Arrays) -> list[Arrays]:
+    """The entries of each array, one for each trial."""
     lists = {name: list(np.atleast_1d(array)) for name, array in stored.items()}
     sizes = {name: len(entries) for name, entries in lists.items()}
     if not any(sizes.values()):

@@ -13,6 +13,7 @@ from collections import Counter
 from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
+from itertools import zip_longest
 from typing import Any
 
 import pandas as pd
@@ -22,7 +23,7 @@ from edge.config import short_text
 from edge.errors import InputError, about
 from train.importers.forms.file import File
 from train.importers.options import TableOptions
-from train.importers.table import EMPTY, Table, numbered, require_unique
+from train.importers.table import EMPTY, Table, require_unique
 
 MARKS = "\t;|,"
 """Separators; a text with none of them in most lines is separated by blanks."""
@@ -113,43 +114,64 @@ def _table(where: str, lines: Sequence[str], form: Sequence[str]) -> Table:
             f"of numbers: {short_text(next(filter(str.strip, lines), ''))}"
         )
     names, units = _heading(lines, rows, first, mark)
-    notes = [*form]
-    above = [line for line in lines[: rows[0].line - 1] if line.strip()]
-    if not all(line.startswith((*COMMENT, "sep=")) for line in above):
-        notes.append(f"the table begins at line {rows[0].line}")
     data = rows[first:]
-    among = [line for line in odd if data[0].line < line < data[-1].line]
-    if len(among) > MOST_ODD * len(data):
-        raise InputError(
-            f"line {among[0]} has another number of values than most lines, "
-            f"which have {len(data[0].cells)}, and so have {len(among) - 1} others; "
-            "remove them, or part the file"
-        )
-    if among:
-        notes.append(
-            f"{counted(len(among), 'line')} of another width left out, the first is "
-            f"line {among[0]}"
-        )
-    named = bool(names)
-    if not named:
-        names = numbered("", len(data[0].cells))
+    notes = [*form, _head_note(lines, rows), _odd_note(odd, data)]
+    if not names:
         notes.append("no header")
-    unique = [name or f"column {i} unnamed" for i, name in enumerate(names, 1)]
+    places = range(1, len(data[0].cells) + 1)
+    unnamed = "column {} unnamed" if names else "{}"
+    unique = [
+        name or unnamed.format(place) for place, name in zip_longest(places, names)
+    ]
     require_unique(unique)
-    is_comma = mark != "," and any(re.search(COMMA, row.text) for row in data)
-    if is_comma:
+    decimal = _decimal(data, mark)
+    if decimal == ",":
         notes.append("decimal commas")
-    table = _parsed(data, unique, mark, "," if is_comma else ".")
-    empty = table.columns[table.isna().all()]
-    drop = [name for name in empty if name not in names or name == str(len(names))]
+    table = _parsed(data, unique, mark, decimal)
+    # A separator at the ends of rows makes a column without a name or a value.
+    named = set(names or unique[:-1])
+    empty = table.columns[table.isna().all()].difference(named)
     return Table(
         where,
-        table.drop(columns=drop),
-        named=named,
+        table.drop(columns=empty),
+        named=bool(names),
         form=tuple(filter(None, notes)),
         file_names=tuple(unique),
         units=dict(zip(unique, units, strict=False)),
     )
+
+
+def _decimal(rows: Sequence[Row], mark: str) -> str:
+    """The sign before a fraction."""
+    if mark != "," and any(re.search(COMMA, row.text) for row in rows):
+        return ","
+    return "."
+
+
+def _head_note(lines: Sequence[str], rows: Sequence[Row]) -> str:
+    """Where the table begins, if other lines are above it."""
+    above = [line for line in lines[: rows[0].line - 1] if line.strip()]
+    is_plain = all(line.startswith((*COMMENT, "sep=")) for line in above)
+    return "" if is_plain else f"the table begins at line {rows[0].line}"
+
+
+def _odd_note(odd: Sequence[int], rows: Sequence[Row]) -> str:
+    """Which lines among the rows were left out.
+
+    Raises:
+        InputError: they are too many to be slips.
+    """
+    among = [line for line in odd if rows[0].line < line < rows[-1].line]
+    if len(among) > MOST_ODD * len(rows):
+        raise InputError(
+            f"line {among[0]} has another number of values than most lines, "
+            f"which have {len(rows[0].cells)}, and so have {len(among) - 1} others; "
+            "remove them, or part the file"
+        )
+    if not among:
+        return ""
+    lines = counted(len(among), "line")
+    return f"{lines} of another width left out, the first is line {among[0]}"
 
 
 def _mark(lines: Sequence[str]) -> str:
