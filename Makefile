@@ -52,7 +52,7 @@ help:
 	@echo "Thorough tests"
 	@echo "  make hard-cases    the cost of each hard numerical case to us and to the usual tools"
 	@echo "  make hard-cases-versions   the same answers from other ONNX Runtimes"
-	@echo "  make mutants       make 200 random changes to the code: does a test notice each?"
+	@echo "  make mutants       make 200 random changes to the skin, labels, page and C: is each noticed?"
 	@echo "  make fuzz          read 5,000 damaged files of each kind: no crash, no traceback, small memory"
 	@echo "  make kills         kill each command that writes files 60 times: none is damaged"
 	@echo "Upkeep"

@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from edge.early import Product, Uncertified, is_sure
+from edge.early import Product, Uncertified, is_sure, paired
 from edge.events import Decided
 from edge.model.info import Stopping, StoppingRule, Task
 from edge.model.model import Decision
@@ -35,10 +35,10 @@ SURE = StoppingRule(0.1, 0.6, 0.7, 2)
 FIXED = StoppingRule(0.1, 0.6, 2.0, 1)
 
 
-def factors(first, second, stops):
-    """The answers to the factors, with 0.9 and 0.8."""
+def factors(first, second, stops, confidences=(0.9, 0.8)):
+    """The answers to the factors."""
     decided = {}
-    pairs = zip(("first", "second"), (first, second), (0.9, 0.8), stops, strict=True)
+    pairs = zip(("first", "second"), (first, second), confidences, stops, strict=True)
     for name, label, confidence, stop in pairs:
         decided[name] = Decided(name, label, confidence, 0.6, 0.0, 1.0, stopped_by=stop)
     return decided
@@ -65,6 +65,13 @@ def test_a_product_has_its_factors_labels_and_the_product_of_their_confidences()
     assert answer.confidence == 0.72
     assert answer.error == 0.1
     assert answer.flags == ()
+
+
+@pytest.mark.parametrize("confidence", [0.0, None])
+def test_a_factor_without_confidence_leaves_its_product_none(confidence):
+    decided = factors("y", "b", ("confidence",) * 2, (0.9, confidence))
+    info = SimpleNamespace(tasks=TASKS)
+    assert paired(info, CANDIDATE, decided).confidence == 0.0
 
 
 @pytest.mark.parametrize(

@@ -78,6 +78,21 @@ def test_a_channel_that_another_program_opens_beside_is_noticed_and_closed(bus):
     assert first.kept()
 
 
+def test_every_mux_that_another_program_opened_is_closed():
+    addresses = (0x70, 0x71, 0x72)
+    bus = FaultyBus(chips={address: FakeTCA9548A() for address in addresses})
+    muxes = []
+    for address in addresses:
+        muxes.append(TCA9548A(bus, address, beside=muxes))
+    muxes[0].select(3)
+    for address in addresses[1:]:
+        bus.transfer(bus.prepare(write(address, b"\x08")))
+    assert not muxes[0].kept()
+    muxes[0].forget()
+    muxes[0].select(3)
+    assert [mux.connected for mux in bus.chips.values()] == [[3], [], []]
+
+
 @pytest.mark.parametrize(("verify", "bits"), [(True, 40), (False, 20)])
 def test_a_selection_takes_20_bits_reading_it_back_20_more_and_the_same_again_none(
     verify, bits

@@ -57,6 +57,15 @@ def test_drift_slower_than_a_count_a_frame_is_followed_exactly():
     assert worst <= 2
 
 
+def test_half_a_count_is_rounded_up():
+    """A step of 1/8 count: Python's whole numbers are the oracle."""
+    following = baseline([1000] * 3, step_counts=0.125, limit=500)
+    for step in range(1, 17):
+        following.follow(raw(3000, 0, 1000), EVERY)
+        eighths = (8000 + step, 8000 - step, 8000)
+        assert following.counts.tolist() == [(n + 4) // 8 for n in eighths]
+
+
 def test_noise_does_not_carry_it_away():
     draw = np.random.default_rng(7)
     still = baseline([1000] * 400, step_counts=0.2, limit=500)

@@ -95,6 +95,7 @@ def test_after_a_brown_out_every_taxel_is_back_in_half_a_second_also_when_it_rep
         )
         assert outcome.wrong == 0
         assert outcome.back_s <= BACK_S
+        assert outcome.missed_ticks == 0
 
 
 @pytest.mark.parametrize("name", SWEPT)
@@ -145,6 +146,20 @@ def running():
     with faulty_skin(SMALL, Pattern(SMALL)) as skin:
         first = skin.readers[0]
         yield skin, first.bus.chips[0x70].channels[1][0x2D], first.slots[3]
+
+
+@pytest.mark.parametrize("channels", [0, 1 << 3, 1 << 0 | 1 << 1])
+def test_the_next_frame_after_another_program_selected_channels_is_valid(
+    running, channels
+):
+    skin, _, _ = running
+    for reader in skin.readers:
+        mux = reader.bus.chips[0x70]
+        mux.write(bytes([channels]), 0.0)
+        mux.stop()
+    frame = skin.read()
+    assert frame.valid.all()
+    assert Pattern(SMALL).wrong(frame) == 0
 
 
 def test_a_damaged_stage_register_is_found_by_reading_the_stages_in_turn(running):

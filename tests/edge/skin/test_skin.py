@@ -11,7 +11,7 @@ from edge.chips import ad7147
 from edge.chips.block import UNCHANGED_FRAMES
 from edge.errors import EdgeError, InputError
 from edge.fake.clock import VirtualClock
-from edge.fake.player import calibrated, fake_skin, frame_bits, still
+from edge.fake.player import calibrated, fake_buses, fake_skin, frame_bits, still
 from edge.skin import file as skinfile
 from edge.skin.file import Reading
 from edge.skin.loop import Loop
@@ -162,6 +162,18 @@ def test_taxels_that_fall_silent_are_heard_of_and_so_is_their_return():
         (pytest.approx(0.1 + hung_s, abs=0.021), 128),
         (pytest.approx(1.6), 0),
     ]
+
+
+def test_a_skin_without_calibration_follows_no_drift():
+    clock = VirtualClock()
+    buses = fake_buses(CODY, lambda t: PICTURE, clock)
+    with Skin(CODY, buses, clock=clock) as skin:
+        skin.start()
+        before = skin.baseline.counts
+        frames = list(Loop(skin, lasts_s=1.0).frames())
+        raw, valid = skin.raw()
+    np.testing.assert_array_equal(skin.baseline.counts, before)
+    np.testing.assert_array_equal(frames[-1].counts, raw * valid)
 
 
 def test_dead_taxels_are_not_silent():

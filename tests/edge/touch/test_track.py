@@ -49,6 +49,7 @@ def test_a_contact_that_is_under_way_in_the_first_frame_is_late(peaks, late, mos
 
 def test_a_contact_begins_above_the_upper_threshold_and_lasts_to_the_lower():
     assert follow([15, 15, 20, 20]) == []
+    assert follow([30, 20, 20]) == []  # a peak at onset confirms no contact
     hovering = [25, 25, 15, 25, 12, 15, 15, 15]
     assert follow(hovering) == [(0.0, hovering, False)]
 
