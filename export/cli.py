@@ -131,8 +131,7 @@ OPTIONS: dict[str, dict[str, Any]] = {
     "--window": {
         "type": seconds,
         "help": "seconds from onset that a decision is based on (default: "
-        f"{WINDOW_S:g}, or more if touches last longer and a longer window is much more "
-        "accurate)",
+        f"{WINDOW_S:g}, or more if touches last longer and the gain is worth the wait)",
     },
     "--second-worth": {
         "type": within(float, 0.0, 1.0),
