@@ -171,7 +171,7 @@ static bool stop_product(const ec_task *task, ec_event *a) {
     a->label = pair;
     a->confidence = rounded(1.0 * f[0]->confidence * f[1]->confidence);
   }
-  return !task->has_rule || stop(a, task, sure);
+  return stop(a, task, sure);
 }
 
 /* Whether a task is decided at the decision point, by the rule certified for the error rate. */
@@ -181,10 +181,9 @@ static bool is_decided(uint32_t index) {
   ec_event *a = &answers[index];
   if (!task->has_rule) {
     a->flags |= EC_UNCERTIFIED;
-    if (question.point != EC_POINTS - 1) return false;
+    return question.point == EC_POINTS - 1;
   }
   if (task->indices[0]) return stop_product(task, a);
-  if (!task->has_rule) return true;
   bool waits = a->flags & EC_UNUSUAL;
   bool sure = confidence(&task->rule_curve, index) >= task->rule_confidence;
   uint32_t last = waits ? EC_POINTS - 1 : task->rule_last;
