@@ -281,7 +281,7 @@ def run(name, file, faults=(), *, resets=(), seconds=LASTS_S, overhead_s=0.0):
     return watched.outcome(name, met, end, schedule.missed_ticks)
 
 
-def share(kind, rate, *, seconds=20.0, overhead_s=50e-6):
+def share(kind, rate, *, seconds=10.0, overhead_s=50e-6):
     """Play a kind of `SHARES` at a rate on chips that have run well for a second."""
     name, fault = SHARES[kind]
     file = SKINS[name]
@@ -436,7 +436,8 @@ def shares():
             row[f"valid at {rate:.0%}"] = f"{outcome.valid:.1%}"
             if outcome.valid < least or (rate == 1.0 and outcome.beside < LEAST_BESIDE):
                 broken.append(f"{kind} at {rate:.0%}")
-        row["others, at 100%"] = f"{outcome.beside:.1%}"
+        is_alone = math.isnan(outcome.beside)
+        row["others, at 100%"] = "" if is_alone else f"{outcome.beside:.1%}"
         rows.append(row)
     print("\nFrames of which the faulty chip is valid, of all that were due:\n")
     print(tables.markdown(rows), flush=True)
