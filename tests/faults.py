@@ -395,12 +395,7 @@ def scripts():
     )
     flip = [Fault("flip", rate=0.02, **lasting)]
     yield "bit flips in 2 % of reads, AD7147 *", cody, flip
-    yield "the same, block (CRC)", SKINS["block"], flip
     yield "a chip that serves the same bytes on and on *", cody, [Fault("hold", **chip)]
-    for rate, codes in ((0.01, CODES[:4]), (0.1, CODES[:2])):
-        shares = {"rate": rate / len(codes), **lasting}
-        name = f"random errors in {rate:.0%} of transactions"
-        yield name, cody, [Fault(code=code, **shares) for code in codes]
 
 
 def plays(overhead_s):

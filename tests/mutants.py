@@ -66,32 +66,35 @@ def run(names, minutes):
         process.wait()
 
 
+def tried_in_python(count, minutes, only):
+    """{name: status} of mutmut's mutants."""
+    generate()
+    names = drawn(statuses(), count, only)
+    if names:  # mutmut would try all
+        run(names, minutes)
+    return {name: status for name, status in statuses().items() if name in names}
+
+
 def measure(count, minutes, only):
     """Try a sample of mutants; print those that no test notices, and a count of each
     status. 1 if too many are not noticed.
 
     Raises:
-        EdgeError: no mutant's name contains `only`; mutmut would try all.
+        EdgeError: no mutant's name contains `only`.
     """
     in_c = c_mutants.changes()
     of_c = drawn(in_c, count // 2, only)
-    names = []
-    if not only.startswith("export/c"):
-        generate()
-        names = drawn(statuses(), count - len(of_c), only)
-    if not names + of_c:
-        raise EdgeError(f"no mutant's name contains {only!r}")
     results = {}
-    if names:
-        run(names, minutes)
-        results = {name: s for name, s in statuses().items() if name in names}
+    if not only.startswith("export/c"):
+        results = tried_in_python(count - len(of_c), minutes, only)
+    if not (results or of_c):
+        raise EdgeError(f"no mutant's name contains {only!r}")
     with c_mutants.copied() as folder:
         for name in of_c:
             results[name] = c_mutants.status_of(in_c[name], folder)
     unnoticed = sorted(name for name in results if results[name] in UNNOTICED)
     for name in unnoticed:
-        difference = in_c[name] if name in in_c else output("show", name)
-        print(f"{results[name]}: {name}\n{difference}")
+        print(f"{results[name]}: {name}\n{in_c.get(name) or output('show', name)}")
     counts = Counter(results.values())
     print(", ".join(f"{status}: {n}" for status, n in counts.most_common()))
     tried = len(results) - counts["not checked"]

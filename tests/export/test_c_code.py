@@ -11,8 +11,10 @@ import numpy as np
 import pytest
 
 from edge import demo
+from edge.classifier import Classifier
 from edge.elementary import logistic
 from edge.errors import InputError
+from edge.events import Decided
 from edge.model.info import Novelty, margin
 from edge.model.model import Model
 from edge.recording import Recording, load
@@ -140,6 +142,33 @@ def test_scores_on_a_limit_have_the_same_bits(early, tmp_path, monkeypatch):
     for i, info in enumerate([*metadata, half_millionths(model.info)]):
         monkeypatch.setattr(model, "info", info)
         assert_same(model, tmp_path / str(i), touches[:9], error=error)
+
+
+@pytest.mark.slow
+@needs_gcc
+def test_a_pair_of_labels_that_was_never_met_has_no_name(tmp_path, monkeypatch):
+    """Mobility is decided at once, softness at the end: they agree on nothing."""
+    unmet = "soft-by 5"
+    for i, recording in enumerate(pressed(touch, range(8))):
+        if recording.labels["category"] != unmet:
+            save(tmp_path / "data" / f"{i:02d}.npz", recording)
+    words = ["--features", "contact", "--quick", "--decision-points", "0.3,0.6,1.2"]
+    out = export(tmp_path / "out", "--data", tmp_path / "data", *words)
+    model = Model(out / "model.onnx")
+    stopping = {}
+    for task, of_task in model.info.stopping.items():
+        confidence = 0.0 if task == "mobility" else 2.0
+        rules = [replace(r, confidence=confidence, last=2) for r in of_task.rules]
+        stopping[task] = replace(of_task, rules=tuple(rules))
+    monkeypatch.setattr(model, "info", replace(model.info, stopping=stopping))
+    error = max(s.rules[-1].error for s in stopping.values())
+    touches = list(pressed(touch, range(30, 32)))
+    events = Classifier(model, error=error).classify(touches[-1])
+    labels = {e.task: e.label for e in events if isinstance(e, Decided)}
+    assert labels["mobility"] == "by 5"
+    assert labels["softness"] == "soft"
+    assert labels["category"] is None
+    assert_same(model, tmp_path / "c", touches, error=error)
 
 
 @pytest.mark.slow

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from edge.bus.protocol import BusRefused, bus_error
-from edge.bus.retrying import LONGEST_REST_S, RESTS
+from edge.bus.retrying import LONGEST_REST_S, MOST_CREDIT, RESTS
 from edge.chips.ad7147 import DEVICE_ID, IDENTIFIED_EVERY
 from edge.fake.clock import VirtualClock
 from edge.fake.player import calibrated
@@ -237,6 +237,23 @@ def test_a_loose_wire_is_told_twice_a_second_at_most():
     assert heard[0] == "down"
     assert heard[-1] == "running"
     assert len(heard) <= 8
+
+
+def test_a_good_reading_earns_one_credit_and_a_failure_costs_one():
+    with faulty_skin(SMALL, Pattern(SMALL)) as skin:
+        reader = skin.readers[0]
+        slot = reader.slots[3]
+        credits = []
+        for _ in range(MOST_CREDIT + 1):
+            credits.append(slot.credit)
+            skin.read()
+        reader.bus.inject([Fault(code=errno.ETIMEDOUT, at=[0], address=0x2C)])
+        skin.read()
+    assert credits == [*range(1, MOST_CREDIT + 1), MOST_CREDIT]
+    # Read again at the frame's end, the first chip has earned its credit back.
+    assert [slot.credit for slot in reader.slots] == [MOST_CREDIT] * 4
+    slot.fail(reader.slots[0].error or bus_error(errno.EIO, "bus"))
+    assert slot.credit == MOST_CREDIT - 1
 
 
 @pytest.mark.parametrize("kind", SHARES)

@@ -1,5 +1,6 @@
 """From bytes to trusted values: which taxels are valid, and which chips are doubted."""
 
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -8,7 +9,7 @@ import pytest
 from edge.chips import block, mpr121
 from edge.fake.clock import VirtualClock
 from edge.fake.player import calibrated, fake_buses, fake_skin, still
-from edge.skin.decoder import NEVER_STUCK, stuck_limits
+from edge.skin.decoder import NEVER_STUCK, repeat_chance, stuck_limits
 from edge.skin.file import Reading, TaxelCalibration
 from edge.skin.loop import Loop
 from edge.skin.skin import Skin
@@ -109,6 +110,16 @@ def test_equal_readings_prove_a_frozen_chip_only_where_noise_shows_in_counts(
     AD7147 do so four times in a row with less than 1e-9, and two frames may hold one
     conversion."""
     assert (stuck_limits(calibrated(CODY, noise)) == limit).all()
+
+
+def test_the_chance_of_an_equal_reading_is_the_sum_of_squared_chances():
+    """Of a normal distribution, or of one count up and down where noise is small."""
+    edges = (np.arange(-40, 42) - 0.5) / (4.0 * 2**0.5)
+    shares = np.diff([math.erf(edge) for edge in edges]) / 2.0
+    assert repeat_chance(np.array(4.0)) == pytest.approx(np.square(shares).sum(), 0.005)
+    side = 0.2**2 / 2.0
+    exact = (1.0 - 2.0 * side) ** 2 + 2.0 * side**2
+    assert repeat_chance(np.array(0.2)) == pytest.approx(exact)
 
 
 @pytest.mark.parametrize(

@@ -62,6 +62,11 @@ def test_a_mistake_is_one_sentence_that_names_file_and_key(old, new, sentence):
     assert sentence in mistake(SMALL.replace(old, new, 1))
 
 
+def test_labels_to_choose_from_are_read():
+    text = SMALL + '[labels]\nobject = ["box", "cup"]\n'
+    assert skinfile.parse(text).labels == {"object": ("box", "cup")}
+
+
 def calibration(seed=0):
     draw = np.random.default_rng(seed)
     baseline = draw.integers(0, 65536, (4, 6)).astype(np.uint16)

@@ -8,7 +8,7 @@ import pytest
 
 from edge.fake.clock import VirtualClock
 from edge.fake.player import still
-from edge.skin.loop import Loop, Periods, Schedule, Stop, stop_on
+from edge.skin.loop import STOP_S, Loop, Periods, Schedule, Stop, stop_on
 from tests.edge.skin.small import CODY
 
 
@@ -32,6 +32,21 @@ def test_a_late_tick_moves_no_other_and_those_gone_by_are_counted():
     assert due == [0.0, 0.01, 0.03, 0.04, 0.05, 0.06]
     assert schedule.missed_ticks == 1
     assert schedule.periods.percentile(100) == pytest.approx(0.025, abs=2e-5)
+
+
+def test_a_long_wait_looks_now_and_then_whether_to_end():
+    clock = VirtualClock()
+    schedule = Schedule(clock, 1.0)
+    schedule.wait(stop := Stop())
+    sleeps = []
+
+    def sleep_until(t):
+        sleeps.append(t)
+        stop.asked = len(sleeps) == 3
+
+    clock.sleep_until = sleep_until
+    schedule.wait(stop)
+    assert sleeps == pytest.approx([STOP_S, 2 * STOP_S, 3 * STOP_S])
 
 
 def test_percentiles_are_those_of_the_sorted_periods_to_a_bin():

@@ -18,6 +18,13 @@ def test_first_and_block_number_the_stages_row_by_row():
     assert chip.address == 0x2D
 
 
+def test_a_chip_may_have_a_sign_of_its_own():
+    text = SMALL.replace(
+        "channel = 0, address = 0x2D", "sign = 1, channel = 0, address = 0x2D"
+    )
+    assert [chip.sign for chip in skinfile.parse(text).chips] == [-1, 1]
+
+
 def test_taxels_name_each_stage_and_an_empty_one_is_none():
     listed = ", ".join(f"[{i // 3}, {i % 3}]" for i in range(11)) + ", []"
     text = SMALL.replace(
@@ -71,6 +78,8 @@ def test_taxels_name_each_stage_and_an_empty_one_is_none():
             "first = 3",
             "bus 0 chip 1: first must be [row, col], not 3",
         ),
+        ("block = [4, 3]", "block = [5, 3]", "block must be [rows, cols] within 4 x 6"),
+        ("first = [0, 3]", "taxels = 3", "taxels must be a list of [row, col]"),
         (
             "block = [4, 3]",
             "block = [4, 2]",
