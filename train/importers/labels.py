@@ -10,7 +10,8 @@ import pandas as pd
 
 from edge.config import short_text
 from edge.errors import InputError
-from edge.labels import TABLE, read_table
+from edge.labels import TABLE, Row, read_table
+from edge.labels import Table as LabelTable
 from train.importers.forms.file import inner
 from train.importers.forms.long import plain
 from train.importers.forms.text import is_number
@@ -122,12 +123,7 @@ def labels_of(
     table = read_table(folder, "trial")
     if not table.contents:
         return told
-    rows = {}
-    for file, row in table.rows.items():
-        name = re.sub(r"\.(?:npz|csv|txt|json|npy|mat)$", "", file).replace("/", "_")
-        if name in rows:
-            raise InputError(f"{table.path}: {name} has two rows; remove one of them")
-        rows[name] = row
+    rows = _by_trial(table)
     names = [place.name for place in places]
     if not set(names) & rows.keys():
         raise InputError(
@@ -150,6 +146,21 @@ def labels_of(
         labels.append({task: label for task, label in merged.items() if label})
     left_out = frozenset(name for name, row in rows.items() if row.left_out)
     return Labels(labels, TABLE, slips=slips, left_out=left_out)
+
+
+def _by_trial(table: LabelTable) -> dict[str, Row]:
+    """{name of the trial: its row} of a labels.csv, whose files may have suffixes.
+
+    Raises:
+        InputError: a trial has two rows.
+    """
+    rows = {}
+    for file, row in table.rows.items():
+        name = re.sub(r"\.(?:npz|csv|txt|json|npy|mat)$", "", file).replace("/", "_")
+        if name in rows:
+            raise InputError(f"{table.path}: {name} has two rows; remove one of them")
+        rows[name] = row
+    return rows
 
 
 def _told(places: Sequence[Place], options: TableOptions) -> Labels:
