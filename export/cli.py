@@ -28,9 +28,7 @@ from edge.record.slips import counts_text
 from edge.touch import measures
 from edge.touch.features import WINDOW_S
 from edge.writing import check_writable
-from export.api import measure, save
 from train.choose.choose import SECOND_WORTH
-from train.choose.decision_points import MOST_TRIALS
 from train.data.dataset import read
 from train.data.feature_sets import SETS
 from train.data.groups import LEAVE_OUT, TRIAL
@@ -143,8 +141,8 @@ OPTIONS: dict[str, dict[str, Any]] = {
         "metavar": "A:B:STEP",
         "help": "calibrate decisions before the full window (edge-classify run --error), at these "
         "seconds from onset, or at a list a,b,c, or `none` (default: "
-        f"{DECISION_POINTS} with {FEWEST} to {MOST_TRIALS} trials, and fewer points if "
-        "the model would exceed 1.9 MB)",
+        f"{DECISION_POINTS} from {FEWEST} trials on, and fewer points if the model would "
+        "exceed 1.9 MB)",
     },
     "--threshold": {
         "type": counts,
@@ -246,6 +244,8 @@ def run(arguments: argparse.Namespace) -> int:
             suited(former, recording, str(file))
     with single_thread():
         fitted = _fit(arguments)
+        from export.api import measure, save  # loads skl2onnx, which takes two seconds
+
         path = arguments.out / "model.onnx"
         size = save(path, fitted, arguments.name, partial(_write_c, arguments))
         prices = measure(fitted)

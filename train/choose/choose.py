@@ -236,12 +236,9 @@ class Choosing:
         choices = [choice for option in options for choice in option.values()]
         names = {name for choice in choices for name in choice.features}
         dataset = self._dataset.of(sorted(names)).with_kernels(window_s)
-        at_points = [
-            dataset.features(seconds, self._samples)
-            for seconds in points_of(window_s).tolist()
-        ]
+        at_points = dataset.at_points(points_of(window_s).tolist(), self._samples)
         widths = dataset.widths(self._samples)
-        vectors = Vectors(np.stack(at_points), self._y, dataset.names, widths)
+        vectors = Vectors(at_points, self._y, dataset.names, widths)
         folds = self._divisions.folds
         heading = "early choices" * self._progress
         return settle_early(vectors, window_s, options, folds, self._jobs, heading)

@@ -16,9 +16,6 @@ STEPS_S = (0.1, 0.2, 0.3, 0.4, 0.6)
 at the same error (cody18, household)."""
 FIRST_S = 0.2
 """The first decision point."""
-MOST_TRIALS = 2000
-"""With more trials early decisions take minutes to calibrate, so their decision points
-must be asked for."""
 LARGEST_BYTES = 1_600_000
 """Bytes of weights with which a model stays below 1.9 MB."""
 
@@ -44,7 +41,7 @@ def has_early_points(settings: Settings, options: FitOptions) -> bool:
     """Whether decision points before the full window are asked for, or usual."""
     if options.decision_points_s is not None:
         return len(options.decision_points_s) > 1
-    return FEWEST <= settings.tested <= MOST_TRIALS
+    return settings.tested >= FEWEST
 
 
 def usual_points(
@@ -70,13 +67,6 @@ def usual_points(
             f"least {FEWEST} trials, not {tested}"
         )
         return ()
-    if tested > MOST_TRIALS:
-        notes.append(
-            f"no decision points before the full window: {tested} trials are more than "
-            f"the {MOST_TRIALS} for which they are made by default; --decision-points "
-            "asks for them"
-        )
-        return (settings.window_s,)
     dataset = dataset.of(sorted(settings.features()))
     for every_s in STEPS_S:
         # A long window has as many decision points as the usual one.

@@ -1,13 +1,16 @@
 """The settings that a fit has chosen."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from typing import Self
 
 import numpy as np
 
 from edge.arrays import Integers
 from train.choose.candidates import Candidate
 from train.choose.evaluate import Promise
+from train.data.folds import finest, stratified_folds
+from train.data.vectors import Labels
 from train.model.pipeline import Choice, Choices
 from train.model.stopping import Early
 
@@ -66,6 +69,18 @@ class Settings:
     window_s: float
     notes: list[str]
     early: Early | None = None
+
+    def with_others(self, chosen_by: Integers, y: Labels) -> Self:
+        """The settings with folds for all trials, of which some had no part in the
+        choice.
+
+        Args:
+            chosen_by: (m,) the trials that had.
+            y: {task: (n,) labels} of all.
+        """
+        folds = stratified_folds(y[finest(y)], len(self.without))
+        folds[chosen_by] = self.folds
+        return replace(self, folds=folds)
 
     @property
     def choices(self) -> dict[str, Choice]:

@@ -5,17 +5,19 @@ from __future__ import annotations
 import hashlib
 import io
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cache, cached_property
 from itertools import compress
 from operator import not_
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from joblib import delayed
+from numpy.typing import NDArray
 
-from edge.arrays import Booleans, Floats
+from edge.arrays import Floats
 from edge.errors import InputError
 from edge.files import read_bytes
 from edge.record.labels import read_table
@@ -41,6 +43,7 @@ from train.data.contacts import (
 from train.data.feature_sets import axes, moves, unit
 from train.data.kernels import MOST_TOUCHES, kernel_table
 from train.data.labels import shared_tasks
+from train.data.scratch import Scratch
 from train.data.vectors import Labels, Strings, Vectors
 from train.progress import bar, say
 from train.threads import in_processes
@@ -59,11 +62,17 @@ class Recordings:
         paths: of the files, in their order.
         recordings: one a file.
         digest: SHA-256 over the files' bytes, and over labels that a table gives.
+        scratch: of their counts.
     """
 
     paths: tuple[Path, ...]
     recordings: tuple[Recording, ...]
     digest: str
+    scratch: Scratch = field(default_factory=Scratch, compare=False, repr=False)
+
+    def each(self) -> Iterator[Recording]:
+        """The recordings, a few of them in memory at once."""
+        return self.scratch.each(self.recordings)
 
     @property
     def of_owner(self) -> tuple[Recording, ...]:
@@ -109,6 +118,7 @@ class DataSet:
         unused: recordings with more contacts than were used.
         kernels: {feature: its table} of the features that are made of kernels, see
             `with_kernels`.
+        scratch: of the trials' series and features.
     """
 
     trials: tuple[Trial, ...]
@@ -122,10 +132,12 @@ class DataSet:
     left_out: dict[str, tuple[Path, ...]]
     unused: tuple[Path, ...]
     kernels: Mapping[str, KernelTable] = field(default_factory=dict)
+    scratch: Scratch = field(default_factory=Scratch, compare=False, repr=False)
 
-    def part(self, trials: Booleans) -> DataSet:
-        """Some of the trials (n,)."""
-        return replace(self, trials=tuple(compress(self.trials, trials)))
+    def part(self, trials: NDArray[Any]) -> DataSet:
+        """Some of the trials, by a mask (n,) or by their numbers."""
+        numbers = np.arange(len(self.trials))[trials]
+        return replace(self, trials=tuple(self.trials[i] for i in numbers))
 
     def untouched_labels(self, task: str) -> list[str]:
         """The labels for a task of the recordings in which no contact was found."""
@@ -168,12 +180,33 @@ class DataSet:
             names: some of the features measured; all where None.
         """
         names = self.names if names is None else tuple(names)
-        return np.stack(
-            [
-                feature_vector(t.series, window_s, samples, names, self.kernels)
-                for t in self.trials
-            ]
-        )
+        keys = {
+            name: (id(self.trials), window_s, samples, name, self.kernels.get(name))
+            for name in names
+        }
+        kept = self.scratch.kept
+        missing = [name for name in names if keys[name] not in kept]
+        if missing:
+            sizes = widths(missing, samples, self.layout, self.joints)
+            table = self.scratch.empty((len(self.trials), sum(sizes)))
+            for row, trial in zip(table, self.scratch.each(self.trials), strict=True):
+                row[:] = feature_vector(
+                    trial.series, window_s, samples, missing, self.kernels
+                )
+            columns = np.split(table, np.cumsum(sizes)[:-1], axis=1)
+            # The trials stay with what is known of them, so that no others get their id.
+            for name, of_name in zip(missing, columns, strict=True):
+                kept[keys[name]] = self.trials, of_name
+        return np.concatenate([kept[keys[name]][1] for name in names], axis=1)
+
+    def at_points(self, points_s: Sequence[float], samples: int) -> Floats:
+        """(points, n, p) feature vectors at several windows."""
+        shape = (len(points_s), len(self.trials), sum(self.widths(samples)))
+        X = self.scratch.empty(shape)
+        for of_point, seconds in zip(X, points_s, strict=True):
+            of_point[:] = self.features(seconds, samples)
+            self.scratch.release()
+        return X
 
     def vectors(self, window_s: float, samples: int, y: Labels) -> Vectors:
         """The feature vectors at a window, with the labels of some tasks."""
@@ -245,14 +278,16 @@ def read(data: Sequence[str | Path], *, progress: bool = False) -> Recordings:
         )
     digest = hashlib.sha256()
     recordings: list[Recording] = []
+    scratch = Scratch()
     table_of = cache(read_table)
     for path in bar(paths, desc="reading", disable=not progress):
         contents = read_bytes(path, LARGEST_BYTES)
-        recordings.append(load(path, io.BytesIO(contents), table_of))
+        recording = load(path, io.BytesIO(contents), table_of)
+        recordings.append(scratch.put_fields(recording, "frames", "valid", "shear"))
         digest.update(contents)
         if path.name in table_of(path.parent).rows:
             digest.update(json.dumps(recordings[-1].labels, sort_keys=True).encode())
-    return Recordings(tuple(paths), tuple(recordings), digest.hexdigest())
+    return Recordings(tuple(paths), tuple(recordings), digest.hexdigest(), scratch)
 
 
 @dataclass(frozen=True)
@@ -365,7 +400,11 @@ def load_trials(
         delayed(follow)(recording, path, layout, **tracked)
         for recording, path in posed.recordings
     ]
-    trials = in_processes(jobs, work, "following" * progress)
+    scratch = recordings.scratch
+    trials = (
+        ([(onset_s, scratch.put_fields(series)) for onset_s, series in touches], labels)
+        for touches, labels in in_processes(jobs, work, "following" * progress)
+    )
     touched = collect(posed.recordings, trials, layout).completed()
     tasks = shared_tasks(touched.labels, partial=partial)
     labelled = touched.labelled(tasks, partial=partial)
@@ -382,6 +421,7 @@ def load_trials(
         tasks=tasks,
         left_out={need: paths for need, paths in left_out.items() if paths},
         unused=touched.unused,
+        scratch=scratch,
     )
 
 

@@ -24,6 +24,21 @@ def stratified_folds(y: Strings, count: int = FOLDS, seed: int = SEED) -> Intege
     return folds
 
 
+def representative(y: Labels, count: int) -> Integers:
+    """(m,) numbers of about so many of the trials, rising: all where they are no more,
+    else as many of each object as its share is, and one of each set of labels."""
+    labels = np.array(
+        ["\0".join(of_trial) for of_trial in zip(*y.values(), strict=True)]
+    )
+    n = len(labels)
+    if n <= count:
+        return np.arange(n)
+    order = np.random.default_rng(SEED).permutation(n)
+    order = order[np.argsort(labels[order], kind="stable")]
+    first = np.unique(labels[order], return_index=True)[1]
+    return np.unique(order[[*first, *np.arange(count) * n // count]])
+
+
 def group_folds(groups: Strings, count: int = 20) -> Integers:
     """(n,) folds of entire groups: one group each, or several where there are over
     `count`."""

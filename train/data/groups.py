@@ -24,10 +24,7 @@ TRIAL = "trial"
 QUICK_FOLDS = 5
 GROUP_FOLDS = 20
 FEW = 300
-MANY = 2000
-"""Most folds of groups with at most `FEW` trials; with more trials there are ten folds,
-and five with more than `MANY`: four fifths of so many trials teach nearly as much as
-all."""
+"""Most folds of groups with at most `FEW` trials; with more trials there are ten."""
 REPEATS = 3
 FEW_TO_REPEAT = 200
 """How often the trials are divided into folds where there are fewer than
@@ -66,9 +63,9 @@ def groupable(labels: Strings, groups: Strings) -> bool:
     )
 
 
-def fold_count(trials: int, quick: bool = False) -> int:
-    """Folds for so many trials."""
-    return QUICK_FOLDS if quick or trials > MANY else FOLDS
+def fold_count(quick: bool) -> int:
+    """Folds of single trials, and of groups of many."""
+    return QUICK_FOLDS if quick else FOLDS
 
 
 @dataclass(frozen=True)
@@ -103,7 +100,7 @@ def groups_of(
     for name, members in _memberships(dataset, leave_out).items():
         tasks = [t for t in y if t != leave_out and groupable(y[t], members)]
         if tasks:
-            count = fold_count(len(members), quick)
+            count = fold_count(quick)
             if len(members) <= FEW and not quick:
                 count = GROUP_FOLDS
             folds = group_folds(members, count)
@@ -167,7 +164,7 @@ class Divisions:
             quick: fewer folds.
         """
         labels = y[finest(y)]
-        count = fold_count(len(labels), quick)
+        count = fold_count(quick)
         repeats = 1 if quick or len(labels) >= FEW_TO_REPEAT else REPEATS
         folds, *further = (
             stratified_folds(labels, count, SEED + i) for i in range(repeats)

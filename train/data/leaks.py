@@ -23,7 +23,7 @@ def without_copies(recordings: Recordings) -> tuple[Recordings, list[str]]:
     originals: dict[bytes, Path] = {}
     copied = []
     is_original = []
-    for path, recording in zip(recordings.paths, recordings.recordings, strict=True):
+    for path, recording in zip(recordings.paths, recordings.each(), strict=True):
         sha = hashlib.sha256(recording.t.tobytes())
         sha.update(recording.frames.tobytes())
         sha.update(repr(sorted(recording.labels.items())).encode())

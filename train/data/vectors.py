@@ -14,6 +14,8 @@ from edge.touch.features import FEATURES
 
 Strings = NDArray[np.str_]
 
+BLOCK = 1 << 22
+"""Entries of a matrix that is made at once."""
 Labels = Mapping[str, Strings]
 """{task: (n,) labels}; empty where a trial has none, which then does not count."""
 
@@ -38,6 +40,11 @@ def widths_of(
     if len(widths) != len(features) or sum(widths) != columns:
         raise InputError(f"{columns} columns are not those of {len(features)} features")
     return tuple(widths)
+
+
+def blocks(rows: NDArray[Any], others: int) -> list[NDArray[Any]]:
+    """Rows in blocks, whose matrices with so many others take little memory."""
+    return np.array_split(rows, 1 + len(rows) * others // BLOCK)
 
 
 @dataclass(frozen=True)

@@ -105,15 +105,19 @@ def _fold(
     slopes: Sequence[Slopes],
 ) -> list[Answers]:
     """[run] answers to the trials that are left out."""
-    training = vectors.part(~left_out)
-    fits: list[Fits] = [{} for _ in training.X]
-    by_run = []
+    y = {task: labels[~left_out] for task, labels in vectors.y.items()}
+    models: list[list[ContactClassifier]] = [[] for _ in runs]
     with single_thread():
-        for choices in runs:
-            possible = [fittable(at_point, training.y) for at_point in choices]
-            models = at_points(possible, training, fits, slopes)
-            by_run.append(answers(models, vectors.X[:, left_out]))
-    return by_run
+        # A decision point at a time, as all together take much memory.
+        for point, x in enumerate(vectors.X):
+            training = replace(vectors, X=x[~left_out], y=y)
+            fits: Fits = {}
+            for models_of_run, choices in zip(models, runs, strict=True):
+                possible = fittable(choices[point], y)
+                models_of_run.append(
+                    ContactClassifier.of(possible, training, fits, slopes[point])
+                )
+        return [answers(of_run, vectors.X[:, left_out]) for of_run in models]
 
 
 def slopes_at_points(

@@ -25,8 +25,9 @@ roots is rounded once by each operation, so that every engine gives the same bit
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from functools import partial, reduce
 from typing import NamedTuple
 
 import numpy as np
@@ -36,7 +37,7 @@ from scipy.spatial.distance import cdist
 
 from edge.arrays import Booleans, Floats, Integers
 from edge.touch.measures import feature
-from train.data.vectors import Strings, Vectors
+from train.data.vectors import Strings, Vectors, blocks
 from train.threads import in_processes, single_thread
 
 UNUSUAL_RATE = 0.01
@@ -140,26 +141,30 @@ class NoveltySpace:
         labels: Strings,
         widths: Sequence[int],
         least: Floats | float = 0.0,
+        trials: Booleans | slice = slice(None),
     ) -> NoveltySpace:
         """The space of some trials.
 
         Args:
-            X: (decision points, n, p) their vectors.
+            X: (decision points, n, p) vectors.
             labels: (n,) whose trials are alike.
             widths: columns of each feature type.
             least: (p,) of `least_deviations`.
+            trials: (n,) mask of those that it is the space of.
         """
-        scales = [_scale(x, widths, least) for x in X]
-        steps = [_steps(x, *scale) for x, scale in zip(X, scales, strict=True)]
-        trials = X.shape[1]
+        labels = labels[trials]
+        scales = [_scale(x[trials], widths, least) for x in X]
+        # A decision point at a time, as all together take much memory.
+        steps = partial(map, lambda x, scale: _steps(x[trials], *scale), X, scales)
         columns = X.shape[-1] - int(np.isinf(least).sum())
         # Half of the columns, so that something can lie outside the components.
-        most = min(MOST_COMPONENTS, trials // TRIALS_A_COMPONENT, columns // 2)
-        axes = _axes(np.concatenate(steps), max(most, 1))
+        most = min(MOST_COMPONENTS, len(labels) // TRIALS_A_COMPONENT, columns // 2)
+        is_wide = len(X) * len(labels) < X.shape[-1]
+        axes = (_axes_of_few if is_wide else _axes)(steps(), max(most, 1))
         shift = _shift(axes, STORED_BITS)
         weights = np.rint(np.ldexp(axes, shift))
         points = []
-        for scale, of_point in zip(scales, steps, strict=True):
+        for scale, of_point in zip(scales, steps(), strict=True):
             z = _product(of_point, weights, shift)
             points.append(_point(*scale, z, labels))
         return cls(weights, shift, tuple(points))
@@ -183,8 +188,11 @@ class NoveltySpace:
 def _nearest(y: Floats, rows: Floats, nearness: Floats) -> Floats:
     """(m,) root of the least squared distance of points y (m, c) to rows (n, c), times
     the nearness (n,) of these."""
-    squares = cdist(y, rows, "sqeuclidean") * nearness
-    return np.asarray(np.sqrt(squares.min(axis=1)))
+    least = [
+        (cdist(block, rows, "sqeuclidean") * nearness).min(axis=1)
+        for block in blocks(y, len(rows))
+    ]
+    return np.asarray(np.sqrt(np.concatenate(least)))
 
 
 def least_deviations(vectors: Vectors, drawn: bool) -> Floats:
@@ -249,17 +257,20 @@ def _product(x: Floats, weights: Floats, shift: int) -> Floats:
     return np.asarray(np.rint(np.ldexp(x @ weights, -shift)))
 
 
-def _axes(steps: Floats, count: int) -> Floats:
-    """(p, count) principal components of steps (m, p) around 0."""
-    rows, columns = steps.shape
-    if rows < columns:
-        last = [rows - min(count, rows), rows - 1]
-        values, vectors = eigh(steps @ steps.T, subset_by_index=last)
-        axes = steps.T @ vectors
-        lengths = np.sqrt(np.maximum(values, 1.0))
-        return np.asarray(axes / lengths)
-    last = [columns - count, columns - 1]
-    return np.asarray(eigh(steps.T @ steps, subset_by_index=last)[1])
+def _axes(steps: Iterable[Floats], count: int) -> Floats:
+    """(p, count) principal components of steps [(n, p)] around 0. Their scatter is a sum
+    of whole numbers below 2^53."""
+    scatter = reduce(np.add, (x.T @ x for x in steps))
+    last = [len(scatter) - count, len(scatter) - 1]
+    return np.asarray(eigh(scatter, subset_by_index=last)[1])
+
+
+def _axes_of_few(steps: Iterable[Floats], count: int) -> Floats:
+    """`_axes` of fewer rows than columns."""
+    rows = np.concatenate(list(steps))
+    last = [len(rows) - min(count, len(rows)), len(rows) - 1]
+    values, vectors = eigh(rows @ rows.T, subset_by_index=last)
+    return np.asarray(rows.T @ vectors / np.sqrt(np.maximum(values, 1.0)))
 
 
 def _shift(values: Floats, bits: int) -> int:
@@ -308,14 +319,17 @@ def _turned(whitening: Floats, between: Floats) -> tuple[Floats, int]:
 def _nearness(rows: Floats, labels: Strings) -> Floats:
     """(n,) one over the squared spacing of each row: half its distance to the nearest
     row of its label, and half the mean of these in its label."""
-    distances = cdist(rows, rows)
-    np.fill_diagonal(distances, np.inf)
-    distances[labels[:, None] != labels] = np.inf
-    alone = distances.min(axis=1)
+    alone = np.full(len(rows), np.inf)
+    names, classes = np.unique(labels, return_inverse=True)
+    for label in range(len(names)):
+        members = np.flatnonzero(classes == label)
+        for block in blocks(members, len(members)):
+            distances = cdist(rows[block], rows[members])
+            distances[members == block[:, None]] = np.inf
+            alone[block] = distances.min(axis=1)
     has_others = np.isfinite(alone)
     usual = float(alone[has_others].mean()) if has_others.any() else 1.0
     alone[~has_others] = usual
-    _, classes = np.unique(labels, return_inverse=True)
     of_label = np.bincount(classes, alone) / np.bincount(classes)
     spacing = np.maximum(0.5 * (alone + of_label[classes]), 1.0)
     return _in_float32(spacing**-2.0)
@@ -358,7 +372,7 @@ def _fold_scores(
     least: Floats | float,
 ) -> Scores:
     with single_thread():
-        space = NoveltySpace.of(X[:, ~left_out], labels[~left_out], widths, least)
+        space = NoveltySpace.of(X, labels, widths, least, ~left_out)
         return space.scores(X[:, left_out])
 
 

@@ -20,7 +20,7 @@ from edge.arrays import Floats, Integers
 from edge.decide.agreement import agreed
 from edge.errors import InputError
 from edge.touch.features import FEATURES
-from train.data.vectors import Labels, Strings, Vectors
+from train.data.vectors import Labels, Strings, Vectors, blocks
 from train.model.agreement import factors_of
 from train.model.projection import Projection
 from train.model.scaling import finite
@@ -340,9 +340,14 @@ class ContactClassifier:
         labels = {}
         distances = {}
         for task, fitted in self.tasks_.items():
-            squares = fitted.squares(X)
-            labels[task] = vote(fitted.labels[fitted.nearest(squares)])
-            distances[task] = fitted.to_labels(squares) * fitted.slope
+            by_block = []
+            for block in blocks(X, self.n_trials_):
+                squares = fitted.squares(block)
+                voted = vote(fitted.labels[fitted.nearest(squares)])
+                by_block.append((voted, fitted.to_labels(squares) * fitted.slope))
+            labels[task], distances[task] = map(
+                np.concatenate, zip(*by_block, strict=True)
+            )
         for task, factors in self.products_.items():
             together, nearest_answers = agreed(task, factors, distances)
             labels |= together

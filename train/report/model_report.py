@@ -249,7 +249,7 @@ def _accuracy(exported: Exported, task: str) -> Section:
     """A task's accuracy, its confusion matrix, and the scores of each class."""
     answer = exported.answers[task]
     chosen = exported.fitted.chosen[task]
-    untouched = exported.fitted.dataset.untouched_labels(task)
+    untouched = exported.fitted.measured.untouched_labels(task)
     tested = answer.truth != ""
     truth = np.array([*answer.truth[tested], *untouched], dtype=str)
     untouched_answers = [

@@ -1,0 +1,85 @@
+"""Arrays in temporary files, so that memory holds those alone that are in use."""
+
+import mmap
+import tempfile
+from collections.abc import Iterable, Iterator
+from dataclasses import fields, replace
+from pathlib import Path
+from typing import Any, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+CHUNK_BYTES = 1 << 26
+EVERY = 256
+"""Items that are in memory at once."""
+ALIGNED = 64
+Item = TypeVar("Item")
+
+
+class Scratch:
+    """Temporary files, which `TMPDIR` places and which end with this.
+
+    Other processes of joblib map the same files, rather than take copies.
+
+    Attributes:
+        kept: {key: what need not be computed again}.
+    """
+
+    def __init__(self) -> None:
+        self.kept: dict[Any, Any] = {}
+        self._folder: tempfile.TemporaryDirectory[str] | None = None
+        self._chunks: list[NDArray[np.uint8]] = []
+        self._used = CHUNK_BYTES
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return Scratch, ()
+
+    def empty(self, shape: tuple[int, ...], dtype: Any = np.float64) -> NDArray[Any]:
+        """An array in a file, whose entries are 0."""
+        size = int(np.prod(shape, dtype=np.int64)) * np.dtype(dtype).itemsize
+        self._folder = self._folder or tempfile.TemporaryDirectory()
+        if self._used + size > CHUNK_BYTES or not self._chunks:
+            path = Path(self._folder.name) / f"{len(self._chunks)}"
+            room = (max(size, CHUNK_BYTES),)
+            self._chunks.append(np.memmap(path, np.uint8, "w+", shape=room))
+            self._used = 0
+            self.release()
+        room_left = self._chunks[-1][self._used : self._used + size]
+        self._used += -(-size // ALIGNED) * ALIGNED
+        values: NDArray[Any] = np.asarray(room_left).view(dtype)
+        return values.reshape(shape)
+
+    def put(self, item: Any) -> Any:
+        """An array, or a record of arrays, or a dictionary of them, in a file."""
+        if isinstance(item, dict):
+            return {key: self.put(value) for key, value in item.items()}
+        if isinstance(item, np.ndarray) and item.nbytes:
+            stored = self.empty(item.shape, item.dtype)
+            stored[...] = item
+            return stored
+        return item
+
+    def put_fields(self, record: Any, *names: str) -> Any:
+        """A dataclass whose arrays are in a file; those of some names alone, where
+        there are some."""
+        changes = {
+            field.name: self.put(getattr(record, field.name))
+            for field in fields(record)
+            if not names or field.name in names
+        }
+        return replace(record, **changes)
+
+    def release(self) -> None:
+        """Let go of the memory; what is read again comes from the files."""
+        if hasattr(mmap, "MADV_DONTNEED"):  # Windows has none
+            for chunk in self._chunks:
+                chunk._mmap.madvise(mmap.MADV_DONTNEED)  # type: ignore[attr-defined]
+
+    def each(self, items: Iterable[Item]) -> Iterator[Item]:
+        """Some items whose arrays are in the files, a few of them in memory at once."""
+        for number, item in enumerate(items, 1):
+            yield item
+            if number % EVERY == 0:
+                self.release()
+        self.release()
