@@ -20,7 +20,8 @@ help:
 	@echo "  make test-busy     the fast tests five times beside eight busy processes"
 	@echo "  make export        fit a model to DATA (a folder of recordings; default: simulated ones)"
 	@echo "                     and write model.onnx, golden.npz and report.html to OUT (default:"
-	@echo "                     build); NAME=... names the model; C=DIR writes it in C99 too"
+	@echo "                     build); NAME=... names the model; C=DIR writes it in C99 too;"
+	@echo "                     CLUSTER=tcp://HOST:PORT fits on the workers of a Dask scheduler"
 	@echo "  make demo          fit a model to a small simulated set and decide on touches new to it"
 	@echo "  make study         the paper's analyses of DATA beside ours: build/study/report.html"
 	@echo "  make tradeoff      what accuracy costs in time: build/tradeoff/report.html; BOARD=board.json"
@@ -139,10 +140,14 @@ endif
 FRONTED := --front $(FRONT) --fronts $(or $(FRONTS),$(OUT)/tradeoff/front.json)
 endif
 
-export: $(READY)
+$(VENV)/.cluster: $(READY)
+	$(PIP) --group cluster
+	@touch $@
+
+export: $(READY) $(if $(CLUSTER),$(VENV)/.cluster)
 	$(BIN)/python -m export --data $(RECORDINGS) $(BESIDE) --out $(OUT) --report $(FRONTED) \
 	  $(addprefix --name ,$(NAME)) $(addprefix --compare ,$(COMPARE)) $(if $(TEST),--test $(TEST)) \
-	  $(addprefix --c ,$(C)) $(EXPORT)
+	  $(addprefix --c ,$(C)) $(addprefix --cluster ,$(CLUSTER)) $(EXPORT)
 
 DEMO := $(OUT)/demo
 
@@ -379,7 +384,7 @@ mutants: $(VENV)/.mutants
 	LOKY_MAX_CPU_COUNT=1 $(BIN)/python -m tests.checks.mutants $(MUTANTS)
 
 # The lines that differ are missing pins (<) and pins that nothing needs (>).
-GROUPS := train dev docs browser mutants bench upkeep
+GROUPS := train cluster dev docs browser mutants bench upkeep
 constraints: $(VENV)/.upkeep
 	$(COMPILE) --no-header --python-version 3.11.9 --python-platform x86_64-manylinux_2_28 \
 	  --all-extras $(GROUPS:%=--group %) -o $(VENV)/constraints.txt

@@ -37,7 +37,7 @@ from train.model.projection import KINDS
 from train.model.scaling import SCALINGS
 from train.model.stopping import FEWEST
 from train.report.summary import summary
-from train.threads import single_thread
+from train.threads import on_cluster, single_thread
 from train.tradeoff import front as fronts
 
 FIXED = ("features", "projection", "scaling", "components", "k", "window", "tasks")
@@ -194,6 +194,10 @@ OPTIONS: dict[str, dict[str, Any]] = {
         "default": cpu_count(),
         "help": "processes (default: all cores)",
     },
+    "--cluster": {
+        "metavar": "tcp://HOST:PORT",
+        "help": "a Dask scheduler, whose workers follow and fit",
+    },
     # The model in C.
     "--c": {
         "type": Path,
@@ -242,7 +246,7 @@ def run(arguments: argparse.Namespace) -> int:
         recording = load(file)
         if former is not None:
             suited(former, recording, str(file))
-    with single_thread():
+    with single_thread(), on_cluster(arguments.cluster):
         fitted = _fit(arguments)
         from export.api import measure, save  # loads skl2onnx, which takes two seconds
 

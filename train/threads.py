@@ -5,18 +5,23 @@ import os
 import signal
 import time
 from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from functools import cache
 from multiprocessing import resource_tracker
 from threading import Thread
 from typing import Any
 
-from joblib import Parallel
+from joblib import Parallel, parallel_config
 from threadpoolctl import ThreadpoolController
 
+from edge.errors import InputError
 from train.progress import bar
 
 WATCHED_EVERY_S = 0.5
 """Between two looks at whether the parent still runs."""
+
+ANSWERS_WITHIN_S = 10.0
+"""A scheduler does, or there is none."""
 
 
 @cache
@@ -43,6 +48,34 @@ def _end_with(parent: int) -> None:
         os._exit(1)
 
     Thread(target=watch, daemon=True).start()
+
+
+@contextmanager
+def on_cluster(address: str | None) -> Iterator[None]:
+    """A context in which `in_processes` gives its calls to a Dask scheduler, such as
+    `tcp://host:8786`; to processes of this machine where None.
+
+    Raises:
+        InputError: Dask is missing, or no scheduler answers.
+    """
+    if address is None:
+        yield
+        return
+    try:
+        from distributed import Client  # the group cluster has it
+    except ImportError:
+        raise InputError(
+            "--cluster needs Dask; install it with pip install --group cluster"
+        ) from None
+    try:
+        client = Client(address, timeout=ANSWERS_WITHIN_S, set_as_default=True)
+    except (OSError, ValueError):
+        raise InputError(
+            f"--cluster {address}: no Dask scheduler answers there; start one with "
+            "`dask scheduler`, and name its tcp://HOST:PORT"
+        ) from None
+    with client, parallel_config(backend="dask"):
+        yield
 
 
 def in_processes(

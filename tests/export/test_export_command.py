@@ -1,6 +1,7 @@
 """`make export` as a user meets it."""
 
 import io
+import os
 import shutil
 from contextlib import redirect_stderr
 from pathlib import Path
@@ -9,6 +10,7 @@ from unittest.mock import Mock
 
 import numpy as np
 import pytest
+from joblib import delayed
 
 from edge import demo
 from edge.decide.model import Model
@@ -19,6 +21,7 @@ from edge.record.saving import save
 from export.__main__ import main
 from export.cli import held_out_text
 from tests.conftest import PAPER, export
+from train.threads import in_processes, on_cluster
 
 
 def test_a_folder_that_cannot_be_written_is_named_before_any_work(tmp_path, capsys):
@@ -256,3 +259,20 @@ def test_a_former_model_that_needs_joints_is_refused_before_any_work(
     words = ["--test", str(touch), "--compare", str(demo.MODEL)]
     assert main(["--data", str(recordings), "--out", str(tmp_path), *words]) == 2
     assert f"{touch}: has no joint angles" in capsys.readouterr().err
+
+
+@pytest.mark.slow
+def test_the_workers_of_a_cluster_make_the_same_model(recordings, tmp_path):
+    dask = pytest.importorskip("distributed", reason="the group cluster is missing")
+    words = ["--data", str(recordings), "--features", "paper", "--quick", "--jobs", "1"]
+    assert main([*words, "--out", str(tmp_path / "alone")]) == 0
+    options = {"n_workers": 2, "threads_per_worker": 1, "dashboard_address": None}
+    with dask.LocalCluster(**options) as cluster:
+        address = cluster.scheduler_address
+        out = str(tmp_path / "shared")
+        assert main([*words, "--out", out, "--cluster", address]) == 0
+        with on_cluster(address):
+            (worker,) = in_processes(1, [delayed(os.getpid)()])
+    assert worker != os.getpid()
+    alone, shared = (tmp_path / name / "model.onnx" for name in ("alone", "shared"))
+    assert shared.read_bytes() == alone.read_bytes()

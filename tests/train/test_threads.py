@@ -13,7 +13,9 @@ import pytest
 from joblib import delayed
 from threadpoolctl import threadpool_info, threadpool_limits
 
-from train.threads import in_processes, single_thread
+import train.threads as threads_module
+from edge.errors import InputError
+from train.threads import in_processes, on_cluster, single_thread
 
 ROOT = Path(__file__).parents[2]
 
@@ -84,3 +86,22 @@ def test_no_process_outlives_the_program_that_began_it(number):
                 break
             time.sleep(0.1)
     assert living(program.pid) == 0
+
+
+def test_a_scheduler_that_does_not_answer_is_named(monkeypatch):
+    pytest.importorskip("distributed", reason="the group cluster is missing")
+    monkeypatch.setattr(threads_module, "ANSWERS_WITHIN_S", 0.2)
+    with (
+        pytest.raises(InputError, match=r"--cluster tcp://127.0.0.1:1: no Dask"),
+        on_cluster("tcp://127.0.0.1:1"),
+    ):
+        pass
+
+
+def test_a_cluster_without_dask_says_what_to_install(monkeypatch):
+    monkeypatch.setitem(sys.modules, "distributed", None)
+    with (
+        pytest.raises(InputError, match="pip install --group cluster"),
+        on_cluster("tcp://127.0.0.1:1"),
+    ):
+        pass
