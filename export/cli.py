@@ -44,7 +44,7 @@ FIXED = ("features", "projection", "scaling", "components", "k", "window", "task
 """Options that would make another model than the one that a point was measured with."""
 FORWARDED = (
     "features projection scaling components k tasks leave_out threshold onset "
-    "release dead jobs second_worth"
+    "release dead jobs second_worth skip_damaged"
 ).split()
 """Options that `fit` takes as they are."""
 DECISION_POINTS = "0.2:1.2:0.1"
@@ -77,6 +77,10 @@ OPTIONS: dict[str, dict[str, Any]] = {
         "required": True,
         "metavar": "REC",
         "help": ".npz recordings or folders",
+    },
+    "--skip-damaged": {
+        "action": "store_true",
+        "help": "name the recordings that cannot be read, and go on without them",
     },
     "--out": {
         "type": Path,
@@ -311,7 +315,7 @@ def _fit(arguments: argparse.Namespace) -> Fitted:
             raise InputError(
                 f"--front makes the model that was measured; drop {', '.join(fixed)}"
             )
-        digest = read(arguments.data).digest
+        digest = read(arguments.data, skip_damaged=arguments.skip_damaged).digest
         front = fronts.ParetoFront.read(arguments.fronts, digest)
         point = front.pick(arguments.front)
         print(

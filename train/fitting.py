@@ -119,6 +119,7 @@ def fit(data: DataSet | str | Path | Sequence[str | Path], **options: Any) -> Fi
         arm: for recordings with joint angles that name no arm.
         dead: (row, col) of taxels that are left out.
         quick: fewer candidates and folds.
+        skip_damaged: go on without the files that cannot be read.
         jobs: processes; all cores where None.
         progress: show progress bars on stderr.
 
@@ -185,7 +186,9 @@ def load(
     if isinstance(data, DataSet):
         return Loaded(data, windows, [])
     paths = [data] if isinstance(data, str | Path) else data
-    recordings, notes = without_copies(read(paths, progress=options.progress))
+    every = read(paths, progress=options.progress, skip_damaged=options.skip_damaged)
+    recordings, notes = without_copies(every)
+    notes = [*every.damaged, *notes]
     if options.fixed_window_s is None and not options.quick:
         seconds = [float(r.t[-1] - r.t[0]) for r in recordings.recordings]
         windows = windows_of(seconds)

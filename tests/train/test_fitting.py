@@ -1,10 +1,12 @@
 """From recordings to a fitted model, from Python."""
 
+import numpy as np
 import pytest
 
 import train
 from edge.record.saving import save
 from train.choose.evaluate import VARIANCE
+from train.choose.settings import Settings
 from train.data.dataset import Measurement, load_trials
 from train.data.folds import stratified_folds
 
@@ -83,3 +85,22 @@ def test_names_of_train_are_loaded_when_they_are_asked_for():
     assert train.fit.__module__ == "train.fitting"
     with pytest.raises(AttributeError, match="no attribute 'nothing'"):
         _ = train.nothing
+
+
+def test_settings_are_chosen_by_a_part_of_many_trials_and_fitted_on_all(
+    recordings, monkeypatch
+):
+    monkeypatch.setattr("train.fitting.MOST_CHOSEN", 12)
+    fitted = train.fit(str(recordings), **PAPER, decision_points_s=())
+    assert len(fitted.measured.trials) == 12
+    assert len(fitted.X) == len(fitted.dataset.trials) == 16
+    assert fitted.chosen["category"].accuracy.total == 12
+
+
+def test_trials_that_had_no_part_in_the_choice_get_folds_beside_those_that_had():
+    chosen_by = np.array([0, 3, 4, 8, 9, 11])
+    few = np.array([2, 1, 0, 0, 1, -1])
+    settings = Settings({}, few, [{}] * 3, (), 1.2, [])
+    folds = settings.with_others(chosen_by, {"object": np.array(["cup"] * 12)}).folds
+    assert folds[chosen_by].tolist() == few.tolist()
+    assert set(np.delete(folds, chosen_by).tolist()) == {0, 1, 2}

@@ -35,6 +35,7 @@ class FitOptions(Fixed):
     arm: Chain | None = None
     dead: Sequence[tuple[int, int]] = ()
     quick: bool = False
+    skip_damaged: bool = False
     jobs: int | None = None
     progress: bool = False
 

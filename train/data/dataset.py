@@ -45,13 +45,8 @@ from train.data.kernels import MOST_TOUCHES, kernel_table
 from train.data.labels import shared_tasks
 from train.data.scratch import Scratch
 from train.data.vectors import Labels, Strings, Vectors
-from train.progress import bar, say
+from train.progress import bar
 from train.threads import in_processes
-
-MANY = 2000
-"""Recordings from which on a fit says before it begins how much it will take."""
-A_MINUTE = 1000
-"""Recordings that a quick fit takes in a minute of a processor of 2020."""
 
 
 @dataclass(frozen=True)
@@ -62,12 +57,14 @@ class Recordings:
         paths: of the files, in their order.
         recordings: one a file.
         digest: SHA-256 over the files' bytes, and over labels that a table gives.
+        damaged: a sentence on each file that could not be read.
         scratch: of their counts.
     """
 
     paths: tuple[Path, ...]
     recordings: tuple[Recording, ...]
     digest: str
+    damaged: tuple[str, ...] = ()
     scratch: Scratch = field(default_factory=Scratch, compare=False, repr=False)
 
     def each(self) -> Iterator[Recording]:
@@ -257,37 +254,47 @@ class DataSet:
         return {name: unit(measures.feature(name), self.layout) for name in self.names}
 
 
-def read(data: Sequence[str | Path], *, progress: bool = False) -> Recordings:
+def read(
+    data: Sequence[str | Path], *, progress: bool = False, skip_damaged: bool = False
+) -> Recordings:
     """Read recordings, each file once.
 
     Args:
         data: `.npz` files and folders of them.
         progress: show a progress bar on stderr.
+        skip_damaged: go on without the files that cannot be read.
 
     Raises:
         InputError: no file is named, or one cannot be used.
     """
-    paths = find([str(path) for path in data])
-    if not paths:
+    files = find([str(path) for path in data])
+    if not files:
         raise InputError("no recordings given; name .npz files or a folder of them")
-    if progress and len(paths) >= MANY:
-        gigabytes = 2e-9 * sum(path.stat().st_size for path in paths)
-        say(
-            f"{len(paths)} recordings take about {gigabytes:.1f} GB of memory and, with "
-            f"--quick, {len(paths) // A_MINUTE} minutes of a processor, else many times that"
-        )
     digest = hashlib.sha256()
+    paths: list[Path] = []
     recordings: list[Recording] = []
+    damaged: list[str] = []
     scratch = Scratch()
     table_of = cache(read_table)
-    for path in bar(paths, desc="reading", disable=not progress):
-        contents = read_bytes(path, LARGEST_BYTES)
-        recording = load(path, io.BytesIO(contents), table_of)
+    for path in bar(files, desc="reading", disable=not progress):
+        try:
+            contents = read_bytes(path, LARGEST_BYTES)
+            recording = load(path, io.BytesIO(contents), table_of)
+        except InputError as error:
+            if not skip_damaged:
+                raise
+            damaged.append(f"warning: {error}; it is left out")
+            continue
+        paths.append(path)
         recordings.append(scratch.put_fields(recording, "frames", "valid", "shear"))
         digest.update(contents)
         if path.name in table_of(path.parent).rows:
             digest.update(json.dumps(recordings[-1].labels, sort_keys=True).encode())
-    return Recordings(tuple(paths), tuple(recordings), digest.hexdigest(), scratch)
+    if not recordings:
+        raise InputError(f"no recording can be used: {damaged[0]}")
+    return Recordings(
+        tuple(paths), tuple(recordings), digest.hexdigest(), tuple(damaged), scratch
+    )
 
 
 @dataclass(frozen=True)

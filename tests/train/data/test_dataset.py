@@ -16,7 +16,7 @@ from edge.touch.arm import Chain
 from edge.touch.features import feature_vector
 from tests.conftest import export, in_a_row
 from tests.edge.record.test_recording import sheared as with_shear
-from train.data.dataset import Measurement, load_trials
+from train.data.dataset import Measurement, load_trials, read
 
 
 @pytest.fixture
@@ -291,3 +291,27 @@ def test_angles_are_measured_by_the_names_of_their_joints(
     straight = load_trials([tmp_path / "a"])
     reordered = load_trials([tmp_path / "b"], Measurement(arm=arm))
     np.testing.assert_array_equal(reordered.features(), straight.features())
+
+
+def test_a_damaged_file_is_refused_or_named_and_left_out(folder):
+    (folder / "soft_2.npz").write_bytes(b"PK")
+    with pytest.raises(InputError, match=r"soft_2.npz: "):
+        read([folder])
+    data = read([folder], skip_damaged=True)
+    assert len(data.paths) == len(data.recordings) == 4
+    (sentence,) = data.damaged
+    assert sentence.startswith(f"warning: {folder / 'soft_2.npz'}: ")
+    assert data.digest != read([folder / "soft_0.npz"]).digest
+    with pytest.raises(InputError, match="no recording can be used"):
+        read([folder / "soft_2.npz"], skip_damaged=True)
+
+
+def test_features_are_measured_once_and_those_of_other_trials_anew(recordings):
+    data = load_trials([recordings], Measurement(["max_force", "contact_area"]))
+    X = data.features(0.5, 5)
+    kept = len(data.scratch.kept)
+    assert data.of(["contact_area"]).features(0.5, 5).tolist() == X[:, 5:].tolist()
+    assert len(data.scratch.kept) == kept
+    some = data.part(np.array([3, 1]))
+    assert some.features(0.5, 5).tolist() == X[[3, 1]].tolist()
+    assert data.at_points((0.5, 0.7), 5)[0].tolist() == X.tolist()

@@ -8,7 +8,6 @@ import pytest
 
 from edge.record.recording import Recording
 from edge.record.saving import save
-from train.data import dataset
 from train.data.dataset import read
 from train.data.leaks import leaks, without_copies
 
@@ -28,14 +27,6 @@ def test_copies_of_recordings_are_left_out_and_named(few):
     assert len(unique.recordings) == 4
     assert "1 of 5 recordings are copies" in note
     assert f"such as {few / 'hard_9.npz'} of {few / 'hard_0.npz'};" in note
-
-
-def test_what_a_fit_of_many_recordings_takes_is_said_before_they_are_read(
-    few, monkeypatch, capsys
-):
-    monkeypatch.setattr(dataset, "MANY", 4)
-    read([few], progress=True)
-    assert "4 recordings take about 0.0 GB of memory" in capsys.readouterr().out
 
 
 def test_recordings_of_nothing_are_no_copies(few, make_touch):
