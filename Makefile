@@ -11,7 +11,7 @@ export OPENBLAS_NUM_THREADS := 1
 
 .PHONY: help venv test test-all test-busy lint types export demo demo-data golden study tradeoff wheel wheel-test \
   board-test browser-test c-test kernel-test peers-test service-test hard-cases hard-cases-versions mutants fuzz kills accuracy bench transfer remount docs faults flags risk shifts \
-  stopping soak measured constraints clean
+  stopping soak scale measured constraints clean
 
 help:
 	@echo "Everyday"
@@ -43,6 +43,7 @@ help:
 	@echo "  make bench         speed beside the alternatives"
 	@echo "  make transfer      score a model of SCENE on trials from another engine (MuJoCo)"
 	@echo "  make faults        the cost of each fault on the skin's wires, as a table"
+	@echo "  make scale         processor time, memory and size of the model by the number of recordings"
 	@echo "  make risk          how often certified errors, mean times and FRONT's intervals are not kept"
 	@echo "  make shifts        what touches unlike the training do to answers, and whether doubt tells it"
 	@echo "  make flags         are answers with a flag more often wrong? FLAGS=\"--recordings folders\" of a real skin"
@@ -230,6 +231,10 @@ $(VENV)/.docs: $(READY)
 
 docs: $(VENV)/.docs
 	$(BIN)/python -m mkdocs build --quiet --strict --site-dir $(OUT)/site
+
+# SCALE="--repeats 5 80 357" goes to 10,000 recordings.
+scale: $(DEV)
+	$(BIN)/python -m tests.checks.bench.scale $(SCALE)
 
 risk: $(DEV)
 	$(BIN)/python -m tests.checks.bench.risk $(RISK)

@@ -7,6 +7,7 @@ from edge.errors import EdgeError
 from tests.checks import mutants
 from tests.checks.bench import tables
 from tests.checks.bench.program import start
+from tests.checks.bench.scale import rows_of
 from tests.checks.hard_cases import __main__ as hard_cases
 from tests.checks.hard_cases import elsewhere
 from tests.checks.other_skins import SKINS, touch
@@ -31,6 +32,15 @@ def test_a_number_of_nothing_is_refused(monkeypatch, capsys):
     with pytest.raises(SystemExit):
         start(print, "", ("--every", 1, "every so many positions"))
     assert "--every: must be a whole number from 1" in capsys.readouterr().err
+
+
+def test_what_grows_faster_than_its_bound_is_told():
+    few = {"trials": 100, "processor, s": 10.0, "memory, MB": 400.0, "model, kB": 50.0}
+    many = {**few, "trials": 1600, "processor, s": 80.0}
+    rows, within = rows_of([few, many])
+    assert within
+    assert rows[1]["processor, times"] == rows[1]["processor, at most"] == "8.0"
+    assert not rows_of([few, {**many, "memory, MB": 1601.0}])[1]
 
 
 def test_mutants_without_a_name_are_refused(monkeypatch):

@@ -133,7 +133,10 @@ class DataSet:
 
     def part(self, trials: NDArray[Any]) -> DataSet:
         """Some of the trials, by a mask (n,) or by their numbers."""
-        numbers = np.arange(len(self.trials))[trials]
+        numbers = np.arange(len(self.trials))[trials].tolist()
+        # The same trials are the same tuple, so that features are measured once.
+        if numbers == [*range(len(self.trials))]:
+            return self
         return replace(self, trials=tuple(self.trials[i] for i in numbers))
 
     def untouched_labels(self, task: str) -> list[str]:

@@ -76,6 +76,8 @@ class Vectors:
     def of(self, names: Collection[str]) -> Self:
         """The same trials with the features with these names; all if empty."""
         is_named = [not names or name in names for name in self.features]
+        if all(is_named):  # a copy would leave the file that it may be in
+            return self
         return replace(
             self,
             X=np.ascontiguousarray(self.X[..., self.columns_of(names)]),
