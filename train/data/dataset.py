@@ -289,7 +289,7 @@ def read(
             damaged.append(f"warning: {error}; it is left out")
             continue
         paths.append(path)
-        recordings.append(scratch.put_fields(recording, "frames", "valid", "shear"))
+        recordings.append(scratch.put_fields(recording))
         digest.update(contents)
         if path.name in table_of(path.parent).rows:
             digest.update(json.dumps(recordings[-1].labels, sort_keys=True).encode())

@@ -3,7 +3,7 @@
 import mmap
 import tempfile
 from collections.abc import Iterable, Iterator
-from dataclasses import fields, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -51,7 +51,7 @@ class Scratch:
         return values.reshape(shape)
 
     def put(self, item: Any) -> Any:
-        """An array, or a record of arrays, or a dictionary of them, in a file."""
+        """An array, or a dictionary of them, in a file; anything else as it is."""
         if isinstance(item, dict):
             return {key: self.put(value) for key, value in item.items()}
         if isinstance(item, np.ndarray) and item.nbytes:
@@ -60,15 +60,9 @@ class Scratch:
             return stored
         return item
 
-    def put_fields(self, record: Any, *names: str) -> Any:
-        """A dataclass whose arrays are in a file; those of some names alone, where
-        there are some."""
-        changes = {
-            field.name: self.put(getattr(record, field.name))
-            for field in fields(record)
-            if not names or field.name in names
-        }
-        return replace(record, **changes)
+    def put_fields(self, record: Any) -> Any:
+        """A dataclass whose arrays are in a file."""
+        return replace(record, **self.put(vars(record)))
 
     def release(self) -> None:
         """Let go of the memory; what is read again comes from the files."""
