@@ -350,7 +350,7 @@ class Measurement:
         """
         skin = with_thresholds(data.of_owner[0].layout, self.threshold, self.onset)
         release_s = skin.release_s if self.release_s is None else self.release_s
-        dead = set(_dead(data.recordings))
+        dead = set(_dead(data))
         for row, col in self.dead:
             if row >= skin.rows or col >= skin.cols:
                 raise InputError(
@@ -509,11 +509,11 @@ def require_one_arm(
             )
 
 
-def _dead(recordings: Sequence[Recording]) -> tuple[int, ...]:
+def _dead(data: Recordings) -> tuple[int, ...]:
     """Taxels that no frame of any recording could read."""
-    shape = recordings[0].frames.shape[1:]
+    shape = data.recordings[0].frames.shape[1:]
     alive = np.zeros(shape, dtype=bool)
-    for recording in recordings:
+    for recording in data.each():
         if recording.frames.shape[1:] != shape or recording.valid is None:
             return ()
         alive |= recording.valid.reshape(-1, *shape).any(axis=0)
