@@ -24,7 +24,9 @@ TRIAL = "trial"
 QUICK_FOLDS = 5
 GROUP_FOLDS = 20
 FEW = 300
-"""Most folds of groups with at most `FEW` trials; with more trials there are ten."""
+MANY = 1000
+"""Most folds of groups with at most `FEW` trials; with more trials there are ten folds,
+and five from `MANY` on: four fifths of so many trials teach nearly as much as all."""
 REPEATS = 3
 FEW_TO_REPEAT = 200
 """How often the trials are divided into folds where there are fewer than
@@ -63,9 +65,9 @@ def groupable(labels: Strings, groups: Strings) -> bool:
     )
 
 
-def fold_count(quick: bool) -> int:
-    """Folds of single trials, and of groups of many."""
-    return QUICK_FOLDS if quick else FOLDS
+def fold_count(trials: int, quick: bool = False) -> int:
+    """Folds for so many trials."""
+    return QUICK_FOLDS if quick or trials >= MANY else FOLDS
 
 
 @dataclass(frozen=True)
@@ -100,7 +102,7 @@ def groups_of(
     for name, members in _memberships(dataset, leave_out).items():
         tasks = [t for t in y if t != leave_out and groupable(y[t], members)]
         if tasks:
-            count = fold_count(quick)
+            count = fold_count(len(members), quick)
             if len(members) <= FEW and not quick:
                 count = GROUP_FOLDS
             folds = group_folds(members, count)
@@ -164,7 +166,7 @@ class Divisions:
             quick: fewer folds.
         """
         labels = y[finest(y)]
-        count = fold_count(quick)
+        count = fold_count(len(labels), quick)
         repeats = 1 if quick or len(labels) >= FEW_TO_REPEAT else REPEATS
         folds, *further = (
             stratified_folds(labels, count, SEED + i) for i in range(repeats)

@@ -9,7 +9,7 @@ import pytest
 import train
 from edge.record.saving import save
 from train.data.folds import representative
-from train.data.groups import groupable, kinds_of
+from train.data.groups import fold_count, groupable, kinds_of
 
 
 def test_whole_objects_can_be_left_out_where_each_class_has_several():
@@ -17,6 +17,11 @@ def test_whole_objects_can_be_left_out_where_each_class_has_several():
     assert groupable(np.repeat(["x", "y"], 6), objects)
     assert not groupable(np.repeat(["x", "y"], [8, 4]), objects)
     assert not groupable(np.full(12, "x"), objects)
+
+
+def test_five_folds_are_enough_for_a_quick_choice_and_for_very_many_trials():
+    counts = [fold_count(999), fold_count(1000), fold_count(999, quick=True)]
+    assert counts == [10, 5, 5]
 
 
 def drawn_touches(make_touch, kinds=("box", "bin", "post"), numbered=True):
