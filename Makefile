@@ -324,7 +324,7 @@ $(VENV)/.browser: $(DEV)
 	$(PIP) --group browser
 	@touch $@
 
-BROWSED := tests/edge/tools/test_page_in_a_browser.py tests/train/tradeoff/test_slider.py \
+BROWSED := tests/edge/tools/test_page_in_a_browser.py \
   tests/train/report/test_page.py tests/train/study/test_study_report.py tests/test_site.py
 
 browser-test: $(VENV)/.browser $(VENV)/.docs

@@ -1,7 +1,6 @@
 """The reports' pictures as PNG, each drawn once for a page and once for a phone."""
 
 import io
-import textwrap
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
@@ -24,8 +23,6 @@ STROKES: tuple[tuple[str, str, Any], ...] = (
     ("#444444", "P", (0, (3, 1, 1, 3))),
 )
 """Colour, marker and dashes of each series, so that no two differ by hue alone."""
-HATCHES = ("", "///", "...", "xxx", "|||", "---")
-"""The hatch of each series of bars."""
 STYLE: dict[Any, Any] = {
     "font.size": 9.0,
     "axes.spines.top": False,
@@ -34,7 +31,6 @@ STYLE: dict[Any, Any] = {
     "grid.alpha": 0.25,
     "axes.axisbelow": True,
     "axes.formatter.useoffset": False,
-    "hatch.linewidth": 0.6,
     "text.parse_math": False,  # a label with two dollar signs is no formula
 }
 WIDE = 7.6
@@ -176,8 +172,6 @@ def lines(
     results: Mapping[str, Sequence[Result]],
     *,
     label: str,
-    paper: Mapping[str, Mapping[str, float]] | None = None,
-    ticks: Sequence[str] = (),
 ) -> Figure:
     """Accuracy against x, with a line and binomial intervals for each task.
 
@@ -187,84 +181,13 @@ def lines(
         x: (m,).
         results: {task: m results}.
         label: label of the x axis.
-        paper: {task: {x, as text: percent}} of hollow points.
-        ticks: labels of x, which then lie on a logarithmic axis.
     """
 
     def draw(canvas: Any, phone: bool) -> None:
         axes = canvas.subplots()
         for order, (task, row) in enumerate(results.items()):
             curve(axes, order, task, x, row)
-            points = (paper or {}).get(task, {})
-            if points:
-                colour, marker, _ = STROKES[order % len(STROKES)]
-                style = {"color": colour, "marker": marker, "mfc": "white", "lw": 0.6}
-                places = list(map(float, points))
-                heights = list(points.values())
-                axes.plot(places, heights, **style, label=f"{task}, paper")
-        if ticks:
-            axes.set_xscale("log")
-            axes.set_xticks(x, ticks)
-            axes.minorticks_off()
         axes.set(xlabel=label, ylabel="decisions that are right, %", ylim=(0, 103))
         legend(canvas, axes, 2 if phone else 4)
 
     return picture(name, title, draw, (3.8, 3.6))
-
-
-def bars(
-    name: str,
-    title: str,
-    names: Sequence[str],
-    groups: Mapping[str, Sequence[Result]],
-    *,
-    marks: Mapping[str, Mapping[str, float]] | None = None,
-    mark: str = "paper",
-) -> Figure:
-    """Bars of accuracy with intervals; those of a name's groups lie side by side.
-
-    Args:
-        name: of the picture's file.
-        title: its caption.
-        names: labels along the axis.
-        groups: {group: result for each name}.
-        marks: {group: {name: percent}} of diamonds.
-        mark: the diamonds' name in the legend.
-    """
-    m = len(names)
-    g = len(groups)
-    height = 0.8 / g
-
-    def draw(canvas: Any, phone: bool) -> None:
-        axes = canvas.subplots()
-        diamonds = []
-        for i, (group, row) in enumerate(groups.items()):
-            y = np.arange(m) + (i - (g - 1) / 2) * height
-            values, arms = spread(row)
-            axes.barh(
-                y,
-                values,
-                height * 0.92,
-                color=STROKES[i % len(STROKES)][0],
-                alpha=0.85,
-                hatch=HATCHES[i % len(HATCHES)],
-                ec="white",
-                lw=0,
-                xerr=arms,
-                error_kw={"ecolor": "0.25", "elinewidth": 0.8},
-                label=group,
-            )
-            for marked, percent in (marks or {}).get(group, {}).items():
-                diamonds.append((percent, y[names.index(marked)]))
-        if diamonds:
-            style = {"color": "black", "mfc": "gold", "ms": 5, "ls": "", "label": mark}
-            axes.plot(*zip(*diamonds, strict=True), marker="D", **style)
-        axes.set_yticks(
-            range(m), [textwrap.fill(n, 18 if phone else 40) for n in names]
-        )
-        axes.invert_yaxis()
-        axes.set(xlim=(0, 103), xlabel="decisions that are right, %")
-        legend(canvas, axes, 2 if phone else 5)
-
-    tall = 1.2 + m * (0.14 + 0.16 * g)
-    return picture(name, title, draw, (tall, tall + 0.4), style={"axes.grid.axis": "x"})

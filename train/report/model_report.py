@@ -354,7 +354,7 @@ def _features(exported: Exported) -> Section:
         "label. The table gives each feature's share of all pulls, as a mean over the "
         f"wrong answers and about {EXPLAINED} other left-out trials."
     ]
-    table = Table("features", "Each feature's share of the pull", rows, narrow=3)
+    table = Table("features", "Each feature's share of the pull", rows)
     return Section("Features", text, [table])
 
 

@@ -41,7 +41,7 @@ def summary(fitted: Fitted, prices: Prices) -> str:
     """The candidates, the choice for each task, notes and warnings, as lines of
     text."""
     lines = [
-        *_aligned(candidates(fitted, prices)),
+        candidates(fitted, prices).frame.to_string(index=False),
         "* chosen; in brackets, the 95 % interval of the accuracy on other trials; "
         "- dropped after a few folds, as behind or no better than a cheaper one",
         "",
@@ -63,16 +63,6 @@ def summary(fitted: Fitted, prices: Prices) -> str:
     sequential = fitted.sequential
     lines += doubt({} if sequential is None else sequential.stopping_)
     return "\n".join([*lines, *fitted.notes, *warnings(fitted)])
-
-
-def _aligned(table: Table) -> list[str]:
-    """The lines of a table: two columns to the left, the others to the right."""
-    rows = [list(map(str, row)) for row in (table.columns, *table.cells)]
-    columns = []
-    for i, column in enumerate(zip(*rows, strict=True)):
-        width = max(map(len, column))
-        columns.append([c.ljust(width) if i < 2 else c.rjust(width) for c in column])
-    return list(map("  ".join, zip(*columns, strict=True)))
 
 
 def _by_unit(units: Mapping[str, str]) -> list[str]:
@@ -104,7 +94,7 @@ def candidates(fitted: Fitted, prices: Prices) -> Table:
         row["us per decision"] = round(us, 1)
         row["kB"] = round(kilobytes, 1)
         rows.append(row)
-    return Table("candidates", "Candidates", rows, ("us per decision",), narrow=3)
+    return Table("candidates", "Candidates", rows, ("us per decision",))
 
 
 def accuracy(chosen: Chosen) -> str:

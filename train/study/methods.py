@@ -17,11 +17,9 @@ from train.choose.search import SearchGrid
 from train.data.feature_sets import SETS
 from train.data.folds import finest, group_folds, stratified_folds
 from train.data.vectors import Labels
-from train.report import figures
 from train.report.score import grid_search, interval, majority, nested, percent, score
 from train.report.section import Row, Section, Table
 from train.study.context import Context
-from train.study.sweeps import by_task
 
 PAPER = "the paper's method"
 SEARCHED = "the paper's method, best of its grid"
@@ -123,7 +121,6 @@ def section(context: Context) -> Section:
             row["accuracy %"] = percent(result.accuracy)
             row["unseen objects %"] = never[task].get(method, "")
             rows.append(row | score(result))
-    title = "Accuracy of each method on new contacts"
     return Section(
         "Findings",
         [
@@ -139,17 +136,7 @@ def section(context: Context) -> Section:
             "features by the paper's Method IV; `train/data/feature_sets.py` lists the "
             "features. Extra trees have default settings.",
         ],
-        [Table("methods", title, rows)],
-        [
-            figures.bars(
-                "methods",
-                f"{title}; diamonds show unseen objects",
-                list(by_trial),
-                by_task(by_trial),
-                marks=never,
-                mark="unseen objects",
-            )
-        ],
+        [Table("methods", "Accuracy of each method on new contacts", rows)],
     )
 
 

@@ -3,16 +3,14 @@
 import csv
 import math
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from edge.statistics import wilson
-from train.report.figures import STROKES, legend, picture
-from train.report.section import Figure, Row, Section, Table, counted
+from train.report.section import Row, Section, Table, counted
 
 Numbers = dict[tuple[str, str, str], float]
 """{(table, setting, task): accuracy in percent}."""
@@ -133,8 +131,7 @@ def comparison(data_sets: Sequence[Numbers], tested: int) -> Section:
     """
     mean = mean_of(data_sets)
     shared = [entry for entry in entries() if entry.key in mean]
-    row_of = {entry: _beside(entry, mean[entry.key], tested) for entry in shared}
-    rows = list(row_of.values())
+    rows = [_beside(entry, mean[entry.key], tested) for entry in shared]
     # {(within the interval, a headline): number}
     counts = Counter((row["within"], row["headline"]) for row in rows)
     predicted = counts["yes", ""]
@@ -157,10 +154,9 @@ def comparison(data_sets: Sequence[Numbers], tested: int) -> Section:
             "scene were chosen to meet these, so they are no predictions. Of the other "
             f"{predictions}, {predicted} agree. Nothing was changed to meet them.",
             _disagreements([row for row in rows if row["within"] == "no"]),
-            *_wrong_objects({e.key: e.percent for e in row_of}, mean),
+            *_wrong_objects({e.key: e.percent for e in shared}, mean),
         ],
-        [Table("paper", "The paper's accuracies and ours", rows)],
-        [_against(row_of, title)],
+        [Table("paper", title, rows)],
     )
 
 
@@ -219,34 +215,3 @@ def _disagreements(outside: Sequence[Row]) -> str:
         "lower one means that it lacks some. In Table II some of the paper's methods "
         "are the same classifier; see the section on scaling."
     )
-
-
-def _against(row_of: Mapping[Entry, Row], title: str) -> Figure:
-    """Our accuracies against the paper's; a point is hollow if its interval misses the
-    diagonal."""
-    marks = dict(zip(dict.fromkeys(e.table for e in row_of), "os^", strict=False))
-    strokes = dict(zip(sorted({e.task for e in row_of}), STROKES, strict=False))
-    lowest = min(min(row["paper %"], row["ours %"]) for row in row_of.values())
-    ends = (lowest - 4.0, 102.0)
-
-    def draw(canvas: Any, phone: bool) -> None:
-        axes = canvas.subplots()
-        axes.plot(ends, ends, color="0.4", lw=1, label="equal")
-        for entry, row in row_of.items():
-            colour, _, dashes = strokes[entry.task]
-            x = entry.percent
-            bar = [x + row["from"], x + row["to"]]
-            axes.plot([x, x], bar, color=colour, lw=1, alpha=0.6, ls=dashes)
-            style = {"color": colour, "ms": 6}
-            style["mfc"] = colour if row["within"] == "yes" else "white"
-            axes.plot(x, row["ours %"], marks[entry.table], **style)
-        for task, (colour, _, dashes) in strokes.items():
-            axes.plot([], [], ls=dashes, color=colour, lw=2, label=task)
-        for table, mark in marks.items():
-            axes.plot([], [], mark, color="0.3", label=f"Table {table}")
-        axes.plot([], [], "o", color="0.3", mfc="white", label="disagrees")
-        axes.set(xlabel="the paper's accuracy, %", ylabel="our accuracy, %")
-        axes.set(xlim=ends, ylim=ends)
-        legend(canvas, axes, 3 if phone else 4)
-
-    return picture("paper", title, draw, (5.6, 4.4))

@@ -25,9 +25,7 @@ TABLES = {"resolution": "I", "scaling": "II", "features": "III"}
 """{our table: the paper's table of the same settings}."""
 ANALYSES: tuple[Callable[[Context], Section | None], ...] = (
     methods.section,
-    sweeps.confusion,
     sweeps.resolution,
-    sweeps.window,
     sweeps.scaling,
     sweeps.features,
 )
@@ -162,8 +160,10 @@ def _numbers(sections: Sequence[Section]) -> paper.Numbers:
     numbers = {}
     for table in chain.from_iterable(section.tables for section in sections):
         if table.name in TABLES:
-            for setting, task, accuracy, *_ in table.cells:
-                numbers[TABLES[table.name], str(setting), task] = accuracy
+            for row in table.rows:
+                setting = str(next(iter(row.values())))
+                key = TABLES[table.name], setting, row["task"]
+                numbers[key] = row["accuracy %"]
     return numbers
 
 

@@ -6,8 +6,7 @@ from train.report.figures import PHONE, STROKES, curve, legend, picture, spread
 from train.report.score import majority, percent, points, shares
 from train.report.section import Figure, Row, Section, Table
 from train.tradeoff.measured import Measured
-from train.tradeoff.slider import slider
-from train.tradeoff.uses import Use, cheapest, uses
+from train.tradeoff.uses import Use, uses
 
 TITLE_S = (0.6, 1.2)
 """Windows with their accuracy in a panel's title."""
@@ -34,14 +33,11 @@ def commands(use: Use) -> str:
 
 
 def section(measured: Measured) -> Section:
-    """The accuracy of each task after each time, as tables, a picture and a slider."""
+    """The accuracy of each task after each time, as tables and a picture."""
     return Section(
         "Accuracy after each time",
-        tables=[
-            Table(f"answer_{t}", t, answers(measured, t), narrow=6) for t in measured.y
-        ],
+        tables=[Table(f"answer_{t}", t, answers(measured, t)) for t in measured.y],
         figures=[picture_of(measured)],
-        widget=slider(measured),
     )
 
 
@@ -68,35 +64,7 @@ def early(measured: Measured) -> Section:
             "all trained ones waits for the full window. A thing that is unknown gets no "
             "name, which counts as wrong.",
         ],
-        [Table("early", "Decisions with a requested error rate", rows, narrow=4)],
-    )
-
-
-def prices(measured: Measured) -> Section:
-    """The cheapest use, by the price of a wrong decision and of waiting for a
-    second."""
-    rows: list[Row] = []
-    for task in measured.y:
-        best = cheapest(measured, task)
-        low, high = best.result.interval
-        mean = round(best.price(best.result.accuracy, measured), 2)
-        lowest = round(best.price(high, measured), 2)
-        highest = round(best.price(low, measured), 2)
-        row: Row = {"task": task, "best use": best.name, "mean price": mean}
-        row["95 % interval"] = f"{lowest:g} to {highest:g}"
-        row["command"] = commands(best)
-        rows.append(row)
-    command = measured.commands.tradeoff("--cost wrong=10,second=1")
-    return Section(
-        "The price of a wrong decision",
-        [
-            "In this table a wrong decision about a known object "
-            f"costs {measured.wrong:g}, and waiting for a second costs "
-            f"{measured.second:g}. Give your own prices with `{command}`. The best of "
-            "several uses looks a little better than it is, because chance helped to "
-            "choose it."
-        ],
-        [Table("price", "The use with the lowest mean price of a decision", rows)],
+        [Table("early", "Decisions with a requested error rate", rows)],
     )
 
 

@@ -22,7 +22,6 @@ from train.report.skins import coarser
 from train.report.work import Workers
 from train.tradeoff.choices import Points, chosen, followed
 from train.tradeoff.measured import Measured
-from train.tradeoff.wires import fits, microcontroller, spread, wire, wires
 
 WAITS_S = (0.8, 0.6, 0.4)
 EVERY = (2, 4)
@@ -65,67 +64,41 @@ def changes(raw: Recordings, dataset: DataSet, rate_hz: float) -> list[Change]:
         dataset: their trials.
         rate_hz: frames a second.
     """
-    cases = list(_fewer_frames(raw, dataset.layout, rate_hz))
+    cases = list(_fewer_frames(raw, rate_hz))
     cases += _fewer_taxels(raw, dataset.layout)
     paper = {"features": ["paper"]}
     name = "the paper's features"
     cases.append(Change(name, "only 3 features", dataset, options=paper))
     if dataset.layout.axes:
-        price = shear_price(dataset.layout)
+        taxels = dataset.layout.rows * dataset.layout.cols
+        price = f"{4 * taxels} bytes a frame fewer"
         cases.append(Change("no shear", price, without_shear(dataset)))
     cases += _fewer_trials(dataset)
     return cases
 
 
-def _fewer_frames(
-    raw: Recordings,
-    layout: SkinLayout,
-    rate_hz: float,
-) -> Iterator[Change]:
-    """Every n-th frame, and the wire that then suffices."""
+def _fewer_frames(raw: Recordings, rate_hz: float) -> Iterator[Change]:
+    """Every n-th frame."""
     for n in EVERY:
         price = f"1/{n} of the bits on the wire"
-        carried = [w.name for w in wires(layout) if w.every(rate_hz) == n]
-        if carried:
-            price = f"{carried[0]} are enough"
         thinned = [part(r, slice(None, None, n)) for r in raw.recordings]
         source = replace(raw, recordings=tuple(thinned))
         yield Change(f"{rate_hz / n:.0f} frames a second", price, source)
 
 
 def _fewer_taxels(raw: Recordings, layout: SkinLayout) -> Iterator[Change]:
-    """Larger taxels, and the shorter frames that they have on one bus of AD7147, or
-    on a microcontroller where that serves too few taxels."""
-    one_bus = fits(layout, 1)
-    place = "1 bus of AD7147" if one_bus else "a microcontroller"
-
-    def frame_s(skin: SkinLayout) -> float:
-        plain = replace(skin, axes=None)
-        wiring = wire("", spread(plain, 1)) if one_bus else microcontroller(plain)
-        return wiring.frame_s
-
+    """Larger taxels."""
     for skin, recordings in coarser(layout, raw.recordings):
-        saved = 1e3 * (frame_s(layout) - frame_s(skin))
-        price = f"a frame is {saved:.1f} ms shorter on {place}"
-        name = counted(skin.rows * skin.cols, "taxel")
-        yield Change(name, price, replace(raw, recordings=tuple(recordings)))
+        taxels = skin.rows * skin.cols
+        price = f"{taxels} of {layout.rows * layout.cols} taxels to read"
+        source = replace(raw, recordings=tuple(recordings))
+        yield Change(counted(taxels, "taxel"), price, source)
 
 
 def without_shear(dataset: DataSet) -> DataSet:
     """The same trials without the features of shear."""
     names = [name for name in dataset.names if feature(name).quantity not in OF_SHEAR]
     return dataset.of(names)
-
-
-def shear_price(layout: SkinLayout) -> str:
-    """What three axes cost on the wire."""
-    all_axes = microcontroller(layout)
-    normal_only = microcontroller(replace(layout, axes=None))
-    return (
-        f"{layout.rows * layout.cols * 4} bytes a frame fewer: "
-        f"{1.0 / normal_only.frame_s:.0f} frames a second on one bus at 1 MHz instead of "
-        f"{1.0 / all_axes.frame_s:.0f}"
-    )
 
 
 def _fewer_trials(dataset: DataSet) -> Iterator[Change]:
@@ -258,7 +231,6 @@ def section(measured: Measured) -> Section:
                 title,
                 measured.costs,
                 timed=(TIME,),
-                narrow=1 + len(measured.y),
             )
         ],
     )

@@ -59,13 +59,6 @@ class Certified:
         return paired(self.waited, self.right)
 
 
-def soonest(rules: Sequence[Certified], level: float) -> Certified | None:
-    """The decisions of an accuracy with the shortest mean time; None where none have
-    it."""
-    able = [rule for rule in rules if rule.result.accuracy >= level]
-    return min(able, key=lambda rule: rule.mean_s, default=None)
-
-
 def certified(
     dataset: DataSet,
     decision_points_s: Sequence[float],

@@ -27,8 +27,6 @@ class Measured:
             (`costs.measure`).
         commands: that make these models.
         notes: sentences of the choice.
-        wrong, second: an owner's price of a wrong decision, and of waiting for a
-            second.
     """
 
     y: Labels
@@ -39,8 +37,6 @@ class Measured:
     costs: Sequence[Row]
     commands: Commands
     notes: Sequence[str] = ()
-    wrong: float = 10.0
-    second: float = 1.0
 
     def results(self, task: str) -> dict[float, Result]:
         """{window: accuracy of a task on left-out trials}."""

@@ -16,7 +16,7 @@ EARLY = (
 
 @dataclass(frozen=True)
 class Use:
-    """A way to use a task, and its price.
+    """A way to use a task.
 
     Attributes:
         name: of the way.
@@ -31,10 +31,6 @@ class Use:
     result: Result
     unseen: float | None
     commands: tuple[str, ...]
-
-    def price(self, accuracy: float, measured: Measured) -> float:
-        """The mean price of a decision at an accuracy."""
-        return measured.wrong * (1.0 - accuracy) + measured.second * self.seconds
 
 
 def fixed(measured: Measured, task: str, window_s: float) -> Use:
@@ -65,10 +61,3 @@ def uses(measured: Measured, task: str) -> list[Use]:
     windows = [fixed(measured, task, window) for window in measured.results(task)]
     rules = measured.certified[task]
     return [*windows, *(early(measured, rule) for rule in rules)]
-
-
-def cheapest(measured: Measured, task: str) -> Use:
-    """The use of a task with the lowest mean price of a decision."""
-    return min(
-        uses(measured, task), key=lambda use: use.price(use.result.accuracy, measured)
-    )

@@ -7,9 +7,8 @@ import numpy as np
 import pytest
 from matplotlib.image import imread
 
-from train.choose.evaluate import Result
 from train.report import figures
-from train.report.figures import PHONE, STROKES, bars, confusion
+from train.report.figures import PHONE, confusion
 
 
 def test_the_same_numbers_give_the_same_bytes_and_others_do_not():
@@ -38,16 +37,3 @@ def test_a_confusion_matrix_has_names_on_both_sides(classes, monkeypatch):
 def test_a_label_with_dollar_signs_is_no_formula():
     labels = np.array([r"a $\frac$ b", "c"])
     assert confusion("n", r"no $\frac$ either", labels, labels).png
-
-
-def test_more_tasks_than_strokes_have_bars_all_the_same(monkeypatch):
-    tasks = [f"task {i}" for i in range(len(STROKES) + 1)]
-    listed = []
-
-    def spy(canvas, axes, columns):
-        listed.append(axes.get_legend_handles_labels()[1])
-
-    monkeypatch.setattr(figures, "legend", spy)
-    bars("n", "t", ["method"], {task: [Result(1, 2)] for task in tasks})
-    page, phone = listed
-    assert page == phone == tasks

@@ -45,7 +45,7 @@ def measured(points, certified, **changes):
         "certified": certified,
         "costs": [],
         "board": SimpleNamespace(arithmetic_s=0.0, name="a board"),
-        "commands": Commands(("mine",), Path("a.npz"), BUILD, BUILD / "board.json"),
+        "commands": Commands(("mine",), Path("a.npz"), BUILD),
         "wire_s": 0.0,
     }
     return Measured(**{**facts, **changes})
