@@ -24,7 +24,7 @@ from train.data.dataset import DataSet
 from train.data.groups import TRIAL
 from train.data.labels import NO_CONTACT
 from train.data.usual import usual_touches
-from train.fitting import Fitted
+from train.fitted import Fitted
 from train.model.pipeline import ContactClassifier
 from train.report.summary import names
 

@@ -46,6 +46,7 @@ from tests.bench.shifts import (
     fresh_touches,
 )
 from train.choose.candidates import candidates
+from train.choose.options import FitOptions
 from train.data.dataset import DataSet, Measurement, load_trials
 from train.data.feature_sets import expand
 from train.data.parts import part
@@ -103,7 +104,7 @@ class DrawnSet(DataSet):
 
 def simulated(seed):
     """A batch's trials without their frames, and their vectors (windows, n, p)."""
-    choices = candidates({}, joints=True, quick=True)
+    choices = candidates({}, FitOptions(quick=True), joints=True)
     names = [name for candidate in choices for name in candidate.sets]
     with tempfile.TemporaryDirectory() as folder:
         write(scenes.load(SCENE, seed=seed, count=COUNT), folder)

@@ -58,7 +58,7 @@ def line_of(printed, task):
 
 
 def test_it_prints_the_accuracy_of_each_task(printed):
-    share = "of 16 trials are classified correctly (95 % interval "
+    share = "of 16 trials are right (95 % interval "
     assert share in line_of(printed, "object")
     low, high = wilson(6.4, 6.4)
     interval = f"{share}{100 * low:.0f} to {100 * high:.0f})"

@@ -29,7 +29,7 @@ from tests.hard_cases.neighbours import (
 )
 from train.data.dataset import load_trials
 from train.data.parts import part
-from train.fitting import Fitted
+from train.fitted import Fitted
 from train.model.pipeline import Choice, ContactClassifier
 
 

@@ -9,6 +9,7 @@ from itertools import product
 import numpy as np
 
 from edge.arrays import Integers
+from train.choose.options import FitOptions
 from train.choose.search import NEIGHBOURS, SHRINKAGES, SearchGrid
 from train.data.feature_sets import expand
 from train.data.vectors import Labels
@@ -110,45 +111,16 @@ def features_of(candidates: Sequence[Candidate]) -> tuple[str, ...]:
     return expand([name for candidate in candidates for name in candidate.sets])
 
 
-@dataclass(frozen=True)
-class Fixed:
-    """Settings that are not to be chosen; those that are None are.
-
-    Attributes:
-        features: names of sets and of single features.
-        projection: one of `train.model.projection.KINDS`.
-        scaling: one of `train.model.scaling.SCALINGS`.
-        components: coordinates.
-        k: neighbours.
-    """
-
-    features: Sequence[str] | None = None
-    projection: str | None = None
-    scaling: str | None = None
-    components: int | None = None
-    k: int | None = None
-
-    @property
-    def asks(self) -> bool:
-        """Whether features or a projection are asked for."""
-        return self.features is not None or self.projection is not None
-
-    def thorough(self, kind: str) -> bool:
-        """Whether more numbers are tried, as features are asked for by name."""
-        return self.features is not None and kind == "pca"
-
-
-CHOOSE_ALL = Fixed()
+CHOOSE_ALL = FitOptions()
 
 
 def candidates(
     y: Labels,
-    fixed: Fixed = CHOOSE_ALL,
+    fixed: FitOptions = CHOOSE_ALL,
     *,
     joints: bool = False,
     shear: bool = False,
     drawn: bool = False,
-    quick: bool = False,
 ) -> list[Candidate]:
     """Every candidate with the settings that are held fixed.
 
@@ -159,7 +131,7 @@ def candidates(
     neighbours. Where `kinds_of` names kinds (`drawn`) only what carries over to other
     skins and arms is tried.
     """
-    mode = Mode.drawn(joints) if drawn else Mode.all_others(joints, shear, quick)
+    mode = Mode.drawn(joints) if drawn else Mode.all_others(joints, shear, fixed.quick)
     mode = mode.asked(fixed)
     projections = KINDS if fixed.projection is None else (fixed.projection,)
     every = dict.fromkeys((*mode.usual, *mode.known))
@@ -224,7 +196,7 @@ class Mode:
             together=True,
         )
 
-    def asked(self, fixed: Fixed) -> Mode:
+    def asked(self, fixed: FitOptions) -> Mode:
         """The same mode, with the features that are asked for in place of others."""
         if not fixed.asks:
             return self
@@ -254,7 +226,9 @@ def _beside_every_other(joints: bool, shear: bool) -> list[tuple[str, ...]]:
     ]
 
 
-def _grid(sets: tuple[str, ...], kind: str, fixed: Fixed, mode: Mode) -> SearchGrid:
+def _grid(
+    sets: tuple[str, ...], kind: str, fixed: FitOptions, mode: Mode
+) -> SearchGrid:
     """The numbers that are tried for some feature sets and a projection."""
     neighbours = NEIGHBOURS if fixed.thorough(kind) else FEW_NEIGHBOURS
     components = mode.components if fixed.components is None else (fixed.components,)
@@ -281,7 +255,7 @@ def _with_targets(grid: SearchGrid, y: Labels, mode: Mode) -> list[SearchGrid]:
 def _scaled(
     grids: Sequence[SearchGrid],
     sets: Sequence[str],
-    fixed: Fixed,
+    fixed: FitOptions,
     mode: Mode,
 ) -> tuple[SearchGrid, ...]:
     """The grids with each method of scaling that is tried.

@@ -24,16 +24,12 @@ from train.model.pipeline import Choice, Choices
 from train.model.stopping import Early
 from train.progress import bar
 
-SECOND_WORTH = 0.005
-"""Accuracy that is worth a second of waiting."""
-
-
 Plan = tuple[Integers, Sequence[Choices]]
 """(n,) the fold of each trial, and [fold]{task: the choice made without its trials}."""
 
 
 class Choosing:
-    """Chooses the window, and each task's settings, among candidates.
+    """Chooses each task's settings among candidates.
 
     Args:
         dataset: measured for every candidate.
@@ -133,7 +129,7 @@ class Choosing:
                 by_trial += for_tasks(grid, self._sharing)
         return by_trial, [g for grid in shared for g in for_tasks(grid, self._sharing)]
 
-    def _right(self, window_s: float) -> dict[str, Floats]:
+    def right(self, window_s: float) -> dict[str, Floats]:
         """{task: the shares of right answers to each trial, of the candidate that is
         best in plain cross-validation}."""
         vectors = self._vectors(window_s)
@@ -146,58 +142,20 @@ class Choosing:
             right[task] = protocol.answers(task, shared=False)[place, tested]
         return right
 
+    def shares(self, window_s: float) -> dict[str, float]:
+        """{task: share of right answers} in plain cross-validation."""
+        right = self.right(window_s)
+        return {task: float(of_task.mean()) for task, of_task in right.items()}
+
     def accuracy(self, window_s: float) -> float:
         """Mean accuracy of the tasks in plain cross-validation; missed touches count as
         wrong."""
         accuracies = []
-        for task, right in self._right(window_s).items():
+        for task, right in self.right(window_s).items():
             result = Result(round(right.sum()), len(right))
             untouched = self._dataset.untouched_labels(task)
             accuracies.append(promised(result, untouched).accuracy)
         return sum(accuracies) / len(accuracies)
-
-    def window(
-        self, windows: Sequence[float], second_worth: float = SECOND_WORTH
-    ) -> tuple[float, list[str]]:
-        """The window with the best mean accuracy of the tasks in plain cross-validation,
-        less what the wait is worth.
-
-        Args:
-            windows: in seconds, rising.
-            second_worth: accuracy that is worth a second of waiting.
-
-        Returns:
-            The window in seconds, and sentences that say why, and what a longer one
-            gains.
-        """
-        if len(windows) == 1:
-            return windows[0], []
-        by_window = [self._right(window_s) for window_s in windows]
-        means = {
-            task: np.array([right[task].mean() for right in by_window])
-            for task in self._y
-        }
-        worth = np.mean(list(means.values()), axis=0)
-        worth -= second_worth * np.array(windows)
-        place = int(worth.argmax())
-        shares = []
-        gains = []
-        for task, of_task in means.items():
-            accuracies = zip(of_task, windows, strict=True)
-            shares.append(
-                f"{task} {', '.join(f'{a:.0%} at {w:g} s' for a, w in accuracies)}"
-            )
-            best = int(of_task.argmax())
-            if best > place:
-                gains.append(
-                    f"--window {windows[best]:g}: {task} {of_task[best]:.0%} instead of "
-                    f"{of_task[place]:.0%} in cross-validation"
-                )
-        note = (
-            f"the window is {windows[place]:g} s: a second of waiting counts as "
-            f"{100 * second_worth:g} points of accuracy; in cross-validation "
-        )
-        return windows[place], [f"{note}{'; '.join(shares)} (--window sets it)", *gains]
 
     def choose(self, window_s: float) -> Settings:
         """Each task's settings."""
@@ -216,7 +174,7 @@ class Choosing:
             by_group = {task: groups.by_fold(task) for task in groups.sharing}
             plans[groups.name] = groups.folds, by_folds(by_group)
         together = decided_together(chosen, vectors, plans, self._jobs)
-        return Settings(together, trials.folds, without, self.candidates, window_s, [])
+        return Settings(together, trials.folds, without, self.candidates, window_s)
 
     def early(
         self,

@@ -3,7 +3,7 @@
 import numpy as np
 
 from edge.touch.features import WINDOW_S
-from train.choose.options import FitOptions
+from train.choose.options import MOST_TRIALS, FitOptions
 from train.choose.settings import Settings
 from train.data.dataset import DataSet
 from train.model.novelty import MOST_COMPONENTS
@@ -16,28 +16,20 @@ STEPS_S = (0.1, 0.2, 0.3, 0.4, 0.6)
 at the same error (cody18, household)."""
 FIRST_S = 0.2
 """The first decision point."""
-MOST_TRIALS = 2000
-"""With more trials early decisions take minutes to calibrate, so their decision points
-must be asked for."""
 LARGEST_BYTES = 1_600_000
 """Bytes of weights with which a model stays below 1.9 MB."""
 
 
 def decision_points(
-    measured: DataSet,
-    settings: Settings,
-    options: FitOptions,
-    notes: list[str],
-) -> tuple[float, ...]:
-    """The decision points asked for, or the usual ones."""
+    measured: DataSet, settings: Settings, options: FitOptions
+) -> tuple[tuple[float, ...], list[str]]:
+    """The decision points asked for, or the usual ones, and sentences on them."""
     asked_s = options.decision_points_s
     if asked_s is None:
-        return usual_points(measured, settings, options.samples, notes)
-    if not asked_s:
-        notes.append(
-            "decisions carry no confidence, as the model has no decision points"
-        )
-    return tuple(asked_s)
+        return usual_points(measured, settings, options.samples)
+    if asked_s:
+        return tuple(asked_s), []
+    return (), ["decisions carry no confidence, as the model has no decision points"]
 
 
 def has_early_points(settings: Settings, options: FitOptions) -> bool:
@@ -48,35 +40,29 @@ def has_early_points(settings: Settings, options: FitOptions) -> bool:
 
 
 def usual_points(
-    dataset: DataSet,
-    settings: Settings,
-    samples: int,
-    notes: list[str],
-) -> tuple[float, ...]:
-    """The decision points of a model, where none are asked for.
-
-    There are none without calibration, and fewer where the model would be too large.
+    dataset: DataSet, settings: Settings, samples: int
+) -> tuple[tuple[float, ...], list[str]]:
+    """The decision points of a model, where none are asked for, and a sentence where
+    there are fewer: none without calibration, fewer where the model would be too large.
 
     Args:
         dataset: measured for every candidate.
         settings: of the model.
         samples: values of a feature.
-        notes: takes a sentence where there are fewer.
     """
     tested = settings.tested
     if tested < FEWEST:
-        notes.append(
+        return (), [
             "decisions carry no confidence and none is early: calibration needs at "
             f"least {FEWEST} trials, not {tested}"
-        )
-        return ()
+        ]
+    none_early = "no decision points before the full window"
+    full = (settings.window_s,)
     if tested > MOST_TRIALS:
-        notes.append(
-            f"no decision points before the full window: {tested} trials are more than "
-            f"the {MOST_TRIALS} for which they are made by default; --decision-points "
-            "asks for them"
-        )
-        return (settings.window_s,)
+        return full, [
+            f"{none_early}: {tested} trials are more than the {MOST_TRIALS} for which "
+            "they are made by default; --decision-points asks for them"
+        ]
     dataset = dataset.of(sorted(settings.features()))
     for every_s in STEPS_S:
         # A long window has as many decision points as the usual one.
@@ -84,17 +70,15 @@ def usual_points(
         points = _rising(step_s, settings.window_s)
         size = _size(len(points), dataset, settings, samples)
         if size <= LARGEST_BYTES:
-            if every_s > STEPS_S[0]:
-                notes.append(
-                    f"{len(points)} decision points, one every {step_s:g} s, so that "
-                    "the model stays below 1.9 MB; --decision-points asks for more"
-                )
-            return tuple(points)
-    notes.append(
-        "no decision points before the full window: they would make the model about "
-        f"{size / 1e6:.1f} MB; --decision-points asks for them"
-    )
-    return (settings.window_s,)
+            fewer = (
+                f"{len(points)} decision points, one every {step_s:g} s, so that the "
+                "model stays below 1.9 MB; --decision-points asks for more"
+            )
+            return tuple(points), [fewer] * (every_s > STEPS_S[0])
+    return full, [
+        f"{none_early}: they would make the model about {size / 1e6:.1f} MB; "
+        "--decision-points asks for them"
+    ]
 
 
 def _size(points: int, dataset: DataSet, settings: Settings, samples: int) -> int:

@@ -54,7 +54,6 @@ class Settings:
         without: [fold]{task: the choice made without the fold's trials}.
         candidates: that they were chosen among.
         window_s: of the full decision.
-        notes: sentences that a user should read.
         early: settings of earlier decision points; None where those of the full window
             serve for all.
     """
@@ -64,7 +63,6 @@ class Settings:
     without: list[dict[str, Choice]]
     candidates: Sequence[Candidate]
     window_s: float
-    notes: list[str]
     early: Early | None = None
 
     @property

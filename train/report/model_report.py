@@ -12,6 +12,7 @@ import numpy as np
 from sklearn.metrics import precision_recall_fscore_support
 
 from edge.arrays import Integers
+from edge.commands.output import counted
 from edge.model.model import Model
 from edge.tools.explain import Explanation, Space, explain
 from edge.tools.info import doubt
@@ -19,7 +20,7 @@ from train.choose.evaluate import Result
 from train.data.folds import finest, stratified_folds
 from train.data.labels import NO_CONTACT
 from train.data.vectors import Strings, Vectors
-from train.fitting import Fitted
+from train.fitted import Fitted
 from train.model.pipeline import (
     Choice,
     Choices,
@@ -34,8 +35,8 @@ from train.model.projection import MOST_STEPS
 from train.report import page
 from train.report.figures import confusion, lines
 from train.report.score import interval, percent
-from train.report.section import Row, Section, Table, counted
-from train.report.summary import Prices, accuracy, candidates, names, warnings
+from train.report.section import Row, Section, Table
+from train.report.summary import Prices, accuracy, agreement, candidates, names
 from train.report.work import Workers
 
 QUARTERS = 4
@@ -237,10 +238,7 @@ def write(
         "Where entire groups are held out they count groups, whose trials are right or "
         "wrong together.",
         *doubt(model.info.stopping),
-        *(
-            line[0].upper() + line[1:] + "."
-            for line in (*fitted.notes, *warnings(fitted))
-        ),
+        *(line[0].upper() + line[1:] + "." for line in fitted.notes),
     ]
     return page.write(out, f"Model {model.info.name}", lead, sections)
 
@@ -256,7 +254,7 @@ def _accuracy(exported: Exported, task: str) -> Section:
         label if label == NO_CONTACT else UNTOUCHED for label in untouched
     ]
     answers = np.array([*answer.answers[-1][tested], *untouched_answers], dtype=str)
-    text = f"{accuracy(chosen)}."
+    text = f"{accuracy(chosen)}; {agreement(chosen)}."
     if untouched:
         text += f" The trials include {counted(len(untouched), 'recording')} without a contact."
     labels = sorted(set(truth))

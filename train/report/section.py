@@ -69,8 +69,3 @@ class Section:
     tables: Sequence[Table] = ()
     figures: Sequence[Figure] = ()
     terms: Mapping[str, str] = field(default_factory=dict)
-
-
-def counted(count: int, noun: str) -> str:
-    """The count with its noun, as in `1 recording` and `2 recordings`."""
-    return f"{count:,} {noun}{'' if count == 1 else 's'}"

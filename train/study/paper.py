@@ -9,8 +9,9 @@ from pathlib import Path
 
 import numpy as np
 
+from edge.commands.output import counted
 from edge.statistics import wilson
-from train.report.section import Row, Section, Table, counted
+from train.report.section import Row, Section, Table
 
 Numbers = dict[tuple[str, str, str], float]
 """{(table, setting, task): accuracy in percent}."""

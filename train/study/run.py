@@ -7,11 +7,12 @@ from dataclasses import replace
 from itertools import chain
 from pathlib import Path
 
+from edge.commands.output import counted
 from edge.errors import InputError
 from train.data.dataset import DataSet, Measurement, load_trials
 from train.data.feature_sets import expand
 from train.report.page import write
-from train.report.section import Section, counted
+from train.report.section import Section
 from train.report.work import Workers
 from train.simulate import scene as scenes
 from train.simulate.run import write as simulate

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from edge.commands.output import counted
 from edge.touch.features import WINDOW_S
 from edge.touch.layout import SkinLayout
 from edge.touch.measures import OF_SHEAR, feature
@@ -17,7 +18,7 @@ from train.data.dataset import DataSet, Recordings
 from train.data.folds import finest, stratified_folds
 from train.data.parts import part
 from train.report.score import paired, points
-from train.report.section import Row, Section, Table, counted
+from train.report.section import Row, Section, Table
 from train.report.skins import coarser
 from train.report.work import Workers
 from train.tradeoff.choices import Points, chosen, followed

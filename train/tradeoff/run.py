@@ -8,12 +8,13 @@ from pathlib import Path
 
 import numpy as np
 
+from edge.commands.output import counted
 from edge.errors import InputError
 from edge.recording import Recording
 from edge.writing import write_whole
 from train.data.dataset import DataSet, read
 from train.report.page import write
-from train.report.section import Section, counted
+from train.report.section import Section
 from train.report.work import Workers
 from train.tradeoff import answer, costs, early
 from train.tradeoff import board as boards

@@ -10,7 +10,7 @@ from matplotlib.figure import Figure as MatplotlibFigure
 
 from tests import browser
 from train.report.page import file_name, page, table_csv, write
-from train.report.section import Figure, Section, Table, counted
+from train.report.section import Figure, Section, Table
 
 WIDE = Table(
     "wide",
@@ -100,11 +100,6 @@ def test_words_are_explained_and_code_is_set_as_code():
     text = page("Title", ["take `make <x>`"], [Section("Words", terms={"k": "a & b"})])
     assert "<code>make &lt;x&gt;</code>" in text
     assert "<dt>k</dt><dd>a &amp; b</dd>" in text
-
-
-def test_a_count_has_its_noun():
-    assert counted(1, "trial") == "1 trial"
-    assert counted(1120, "trial") == "1,120 trials"
 
 
 def test_in_a_browser_nothing_overflows_and_no_link_leads_nowhere(tmp_path):
