@@ -166,10 +166,6 @@ docs/tradeoff.png: tradeoff
 	$(BIN)/python -m tests.bench.tables tradeoff "make tradeoff" $(OUT)/tradeoff/answer_*.csv
 
 # The tables of docs/measured.md that a report has measured.
-docs/measured/study.md: STUDY := --seeds 8
-docs/measured/study.md: study
-	$(BIN)/python -m tests.bench.tables study 'make study STUDY="$(STUDY)"' $(OUT)/study/headline.csv
-
 docs/touches.png docs/touches-dark.png: $(READY)
 	$(BIN)/python -m train show edge/demo/*.npz --model edge/demo/model.onnx \
 	  $(if $(findstring dark,$@),--dark) --out $@

@@ -113,9 +113,8 @@ def _draw(
 def contact_of(
     name: str,
     recording: Recording,
-    number: int = 1,
 ) -> tuple[float, FeatureSeries]:
-    """Onset and series of a recording's first contact, or of a later one.
+    """Onset and series of a recording's first contact.
 
     Raises:
         InputError: there is no such contact; the message begins with `name`.
@@ -124,10 +123,9 @@ def contact_of(
     if chain is not None:
         recording = recording.for_joints(chain.names, name)
     touches = contacts(recording, ContactTracker(recording.layout, chain=chain))
-    if not 0 < number <= len(touches):
-        which = "" if number == 1 else f" {number}"
-        raise InputError(f"{name}: holds no contact{which}")
-    return touches[number - 1]
+    if not touches:
+        raise InputError(f"{name}: holds no contact")
+    return touches[0]
 
 
 @dataclass(frozen=True)

@@ -320,8 +320,8 @@ def _wrong(exported: Exported) -> Section:
         "A model that had not seen these trials classified them wrongly. The last "
         "column names the feature that pulls a trial most strongly towards the wrong "
         "answer, compared with the nearest trial of the right label. Wrong labels and "
-        "failed touches often stand out here. `edge-classify explain` and `python -m "
-        "train show` explain any recording in the same way."
+        "failed touches often stand out here. `edge-classify explain` explains any "
+        "recording in the same way."
     ]
     table = Table("wrong", "Wrong answers", rows)
     return Section("Wrong answers", text if rows else ["None."], [table])

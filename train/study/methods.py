@@ -5,18 +5,12 @@ from collections.abc import Callable, Mapping
 from functools import partial
 from operator import call
 
-import numpy as np
-from sklearn.ensemble import ExtraTreesClassifier
-from sklearn.model_selection import PredefinedSplit, cross_val_predict
-
-from edge.arrays import Floats, Integers
 from edge.touch.features import FEATURES, SAMPLES, WINDOW_S
 from train.choose.crossval import MAX_COMPONENTS, MAX_K
 from train.choose.evaluate import Result
 from train.choose.search import SearchGrid
 from train.data.feature_sets import SETS
 from train.data.folds import finest, group_folds, stratified_folds
-from train.data.vectors import Labels
 from train.report.score import grid_search, interval, majority, nested, percent, score
 from train.report.section import Row, Section, Table
 from train.study.context import Context
@@ -30,37 +24,10 @@ PAPERS_GRID = SearchGrid(
     components=tuple(range(1, MAX_COMPONENTS + 1)),
     neighbours=tuple(range(1, MAX_K + 1)),
 )
-TREES = 100
-TIMES = 10
-"""Number of times at which the trees get every taxel."""
 GROUP_TASK = "object"
 
 Answers = Mapping[str, Result]
 """{task: result}."""
-
-
-def extra_trees(X: Floats, y: Labels, folds: Integers) -> Answers:
-    """The accuracy of extra trees, a widely used method, on X (n, taxels over time)."""
-    trees = ExtraTreesClassifier(TREES, random_state=0)
-    split = PredefinedSplit(folds)
-    answers = {}
-    for task, labels in y.items():
-        right = cross_val_predict(trees, X, labels, cv=split) == labels
-        answers[task] = Result(int(right.sum()), len(X))
-    return answers
-
-
-def taxels(context: Context) -> Floats:
-    """(n, times * taxels) counts at evenly spaced times; the last frame stays until the
-    end."""
-    times = np.linspace(0.0, WINDOW_S, TIMES)
-    alive = context.dataset.layout.alive.reshape(-1)
-    rows = []
-    for trial in context.dataset.trials:
-        t = trial.recording.t - trial.onset_s
-        at = np.clip(np.searchsorted(t, times, side="right") - 1, 0, len(t) - 1)
-        rows.append(trial.recording.frames[at].reshape(TIMES, -1)[:, alive].ravel())
-    return np.stack(rows).astype(np.float64)
 
 
 def methods(context: Context) -> dict[str, Callable[..., Answers]]:
@@ -80,8 +47,6 @@ def methods(context: Context) -> dict[str, Callable[..., Answers]]:
             features=subset.names,
             widths=subset.widths(SAMPLES // 2),
         )
-    trees = f"{TREES} extra trees on every taxel"
-    compared[trees] = partial(extra_trees, taxels(context))
     return compared
 
 
@@ -134,7 +99,7 @@ def section(context: Context) -> Section:
             "best of its grid is the accuracy that its grid search maximised with "
             "leave-one-out, so it is too high. The other k-NN methods scale their "
             "features by the paper's Method IV; `train/data/feature_sets.py` lists the "
-            "features. Extra trees have default settings.",
+            "features.",
         ],
         [Table("methods", "Accuracy of each method on new contacts", rows)],
     )

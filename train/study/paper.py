@@ -105,24 +105,6 @@ def mean_of(data_sets: Sequence[Numbers]) -> Numbers:
     }
 
 
-def right_despite_the_object(numbers: Numbers) -> float:
-    """Percent of the trials with a wrong object whose category is right, as a mean over
-    settings.
-
-    The right object nearly implies the right category. So the trials by which the
-    category's accuracy exceeds the object's are trials with a wrong object.
-
-    Args:
-        numbers: percent, with category and object of each setting.
-    """
-    shares = []
-    for (table, setting, task), percent in numbers.items():
-        named = numbers.get((table, setting, "object"), 100.0)
-        if task == "category" and named < 100.0:
-            shares.append(100.0 * (percent - named) / (100.0 - named))
-    return float(np.mean(shares)) if shares else np.nan
-
-
 def comparison(data_sets: Sequence[Numbers], tested: int) -> Section:
     """Each of the paper's accuracies beside ours.
 
@@ -155,7 +137,6 @@ def comparison(data_sets: Sequence[Numbers], tested: int) -> Section:
             "scene were chosen to meet these, so they are no predictions. Of the other "
             f"{predictions}, {predicted} agree. Nothing was changed to meet them.",
             _disagreements([row for row in rows if row["within"] == "no"]),
-            *_wrong_objects({e.key: e.percent for e in shared}, mean),
         ],
         [Table("paper", title, rows)],
     )
@@ -181,23 +162,6 @@ def _beside(entry: Entry, ours: float, tested: int) -> Row:
         "headline": "yes" if entry.headline else "",
         "within": "yes" if low <= 0.0 <= high else "no",
     }
-
-
-def _wrong_objects(theirs: Numbers, ours: Numbers) -> list[str]:
-    """A paragraph on the category in trials with a wrong object; none if a task is
-    missing."""
-    paper_percent = right_despite_the_object(theirs)
-    ours_percent = right_despite_the_object({key: ours[key] for key in theirs})
-    if np.isnan(paper_percent) or np.isnan(ours_percent):
-        return []
-    return [
-        "When the classifier names the wrong object, it still names the right category "
-        f"in {paper_percent:.0f} % of the trials in the paper and in "
-        f"{ours_percent:.0f} % here, as a mean over the settings that have both "
-        "tasks; guessing among four categories gives 25 %. A higher share means that the "
-        "objects of a category feel more alike: a skin that is too coarse to recognise "
-        "the object still recognises its category."
-    ]
 
 
 def _disagreements(outside: Sequence[Row]) -> str:
