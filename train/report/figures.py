@@ -1,4 +1,4 @@
-"""The reports' pictures as PNG, each drawn once for a page and once for a phone."""
+"""The reports' pictures as PNG, and what they share."""
 
 import io
 from collections.abc import Callable, Mapping, Sequence
@@ -34,21 +34,21 @@ STYLE: dict[Any, Any] = {
     "text.parse_math": False,  # a label with two dollar signs is no formula
 }
 WIDE = 7.6
-PHONE = 3.6
+PANEL = 3.6
 """Inches."""
 MATRIX_TEXT = 20
 """A confusion matrix of more classes does not show its numbers."""
 MATRIX_SHARES = 4
 """One of at most so many classes shows shares too."""
 MANY_CLASSES = 6
-"""One of more classes has smaller rows, and on a phone smaller text."""
+"""One of more classes has smaller rows."""
 
 
 def picture(
     name: str,
     title: str,
-    draw: Callable[[Any, bool], None],
-    heights: tuple[float, float],
+    draw: Callable[[Any], None],
+    height: float,
     width: float = WIDE,
     style: Mapping[Any, Any] | None = None,
 ) -> Figure:
@@ -57,22 +57,17 @@ def picture(
     Args:
         name: of its file.
         title: its caption.
-        draw: function of an empty canvas, and of whether that is for a phone.
-        heights: inches on a page and on a phone.
-        width: inches on a page.
+        draw: function of an empty canvas.
+        height: inches.
+        width: inches.
         style: further settings of matplotlib.
     """
-    pngs = []
-    for phone in (False, True):
-        # A phone shows the picture smaller, on a finer screen.
-        size, text, dpi = (PHONE, 8.0, 200) if phone else (width, 9.0, 110)
-        with mpl.rc_context({**STYLE, "font.size": text, **(style or {})}):
-            canvas = Canvas(figsize=(size, heights[phone]), layout="constrained")
-            draw(canvas, phone)
-            buffer = io.BytesIO()
-            canvas.savefig(buffer, format="png", dpi=dpi, metadata={"Software": None})
-        pngs.append(buffer.getvalue())
-    return Figure(name, title, *pngs)
+    with mpl.rc_context({**STYLE, **(style or {})}):
+        canvas = Canvas(figsize=(width, height), layout="constrained")
+        draw(canvas)
+        buffer = io.BytesIO()
+        canvas.savefig(buffer, format="png", dpi=110, metadata={"Software": None})
+    return Figure(name, title, buffer.getvalue())
 
 
 def legend(canvas: Any, axes: Any, columns: int) -> None:
@@ -126,68 +121,31 @@ def confusion(name: str, title: str, truth: Strings, answers: Strings) -> Figure
     n = len(classes)
     counts = confusion_matrix(truth, answers, labels=classes)
     is_large = n > MANY_CLASSES
+    style = {"rotation": 90} if is_large else {"rotation": 30, "ha": "right"}
+    small = 7 if n > MATRIX_TEXT else None
 
-    def draw(canvas: Any, phone: bool) -> None:
+    def draw(canvas: Any) -> None:
         axes = canvas.subplots()
-        small = phone and is_large
-        _name_sides(axes, classes, phone)
-        _draw_matrix(axes, counts, fontsize=7 if small else None)
+        axes.set_xticks(range(n), classes, fontsize=small, **style)
+        axes.set_yticks(range(n), classes, fontsize=small)
+        axes.set(xlabel="answer", ylabel="label")
+        _draw_matrix(axes, counts)
 
     height = 2.4 + 0.3 * n if is_large else 2.6 + 0.45 * n
-    heights = height, 1.8 + 0.16 * n if is_large else 3.4
-    return picture(name, title, draw, heights, height + 1.6, {"axes.grid": False})
+    return picture(name, title, draw, height, height + 1.6, {"axes.grid": False})
 
 
-def _name_sides(axes: Any, classes: Strings, phone: bool) -> None:
-    """Name the rows and the columns of a confusion matrix."""
-    n = len(classes)
-    is_large = n > MANY_CLASSES
-    small = 7 if (phone and is_large) or n > MATRIX_TEXT else None
-    style = {"rotation": 90} if is_large or phone else {"rotation": 30, "ha": "right"}
-    axes.set_xticks(range(n), classes, fontsize=small, **style)
-    axes.set_yticks(range(n), classes, fontsize=small)
-    axes.set(xlabel="answer", ylabel="label")
-
-
-def _draw_matrix(axes: Any, counts: Integers, fontsize: int | None) -> None:
+def _draw_matrix(axes: Any, counts: Integers) -> None:
     """Draw the counts of a confusion matrix, darker with their share of a row."""
     n = len(counts)
     shares = counts / np.maximum(counts.sum(axis=1, keepdims=True), 1)
     axes.imshow(shares, cmap="Blues", vmin=0, vmax=1, aspect="auto")
     if n > MATRIX_TEXT:
         return
-    style = {"ha": "center", "va": "center", "fontsize": fontsize}
+    style = {"ha": "center", "va": "center"}
     for i, j in np.argwhere(counts):
         text = str(counts[i, j])
         if n <= MATRIX_SHARES:
             text += f"\n{shares[i, j]:.0%}"
         colour = "white" if shares[i, j] > 0.55 else "black"
         axes.text(j, i, text, color=colour, **style)
-
-
-def lines(
-    name: str,
-    title: str,
-    x: Sequence[float],
-    results: Mapping[str, Sequence[Result]],
-    *,
-    label: str,
-) -> Figure:
-    """Accuracy against x, with a line and binomial intervals for each task.
-
-    Args:
-        name: of the picture's file.
-        title: its caption.
-        x: (m,).
-        results: {task: m results}.
-        label: label of the x axis.
-    """
-
-    def draw(canvas: Any, phone: bool) -> None:
-        axes = canvas.subplots()
-        for order, (task, row) in enumerate(results.items()):
-            curve(axes, order, task, x, row)
-        axes.set(xlabel=label, ylabel="decisions that are right, %", ylim=(0, 103))
-        legend(canvas, axes, 2 if phone else 4)
-
-    return picture(name, title, draw, (3.8, 3.6))

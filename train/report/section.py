@@ -43,13 +43,11 @@ class Figure:
         name: name of its file.
         title: its caption, which also describes it to readers who cannot see it.
         png: its bytes.
-        narrow: the bytes of a version drawn for a phone.
     """
 
     name: str
     title: str
     png: bytes
-    narrow: bytes
 
 
 @dataclass

@@ -2,7 +2,7 @@
 
 from typing import Any
 
-from train.report.figures import PHONE, STROKES, curve, legend, picture, spread
+from train.report.figures import PANEL, STROKES, curve, legend, picture, spread
 from train.report.score import majority, percent, points, shares
 from train.report.section import Figure, Row, Section, Table
 from train.tradeoff.measured import Measured
@@ -141,12 +141,11 @@ GLOSSARY = {
 def picture_of(measured: Measured) -> Figure:
     """Accuracy against time in a panel for each task."""
     m = len(measured.y)
-    wide = m if m <= ACROSS else -(-m // 2)
-    heights = 3.0 * -(-m // wide) + 0.4, 2.6 * m + 0.4
+    across = m if m <= ACROSS else -(-m // 2)
+    down = -(-m // across)
 
-    def draw(canvas: Any, phone: bool) -> None:
-        across = 1 if phone else wide
-        grid = canvas.subplots(-(-m // across), across, squeeze=False, sharey=True)
+    def draw(canvas: Any) -> None:
+        grid = canvas.subplots(down, across, squeeze=False, sharey=True)
         for axes, task in zip(grid.flat, measured.y, strict=False):
             _panel(axes, task, measured)
         for axes in grid.flat[m:]:
@@ -156,10 +155,11 @@ def picture_of(measured: Measured) -> Figure:
         fullest = max(
             grid.flat, key=lambda axes: len(axes.get_legend_handles_labels()[0])
         )
-        legend(canvas, fullest, 2 if phone else 3)
+        legend(canvas, fullest, 3)
 
     title = "Accuracy against the time of the decision, for each task"
-    return picture("tradeoff", title, draw, heights, max(PHONE * wide, PHONE + 2.0))
+    width = max(PANEL * across, PANEL + 2.0)
+    return picture("tradeoff", title, draw, 3.0 * down + 0.4, width)
 
 
 def _panel(axes: Any, task: str, measured: Measured) -> None:

@@ -38,7 +38,7 @@ def test_text_from_elsewhere_is_escaped():
 @pytest.mark.parametrize("task", ["../up", "a/b", HOSTILE])
 def test_a_task_of_any_name_stays_in_the_folder_of_the_report(tmp_path, task):
     out = tmp_path / "report"
-    figures = [Figure(f"confusion_{task}", "A plot", b"\x89PNG", b"")]
+    figures = [Figure(f"confusion_{task}", "A plot", b"\x89PNG")]
     tables = [Table(f"answer_{task}", "A table", [{"n": 1}])]
     report = write(out, "Title", [], [Section("One", [], tables, figures)])
     assert [path.name for path in tmp_path.iterdir()] == ["report"]
@@ -75,7 +75,7 @@ def test_timings_are_in_a_file_of_their_own():
 
 def test_the_page_holds_its_pictures_and_no_table_without_rows(tmp_path):
     tables = [table(), Table("empty", "Nothing", [])]
-    figures = [Figure("plot", "A plot", b"\x89PNG", b"")]
+    figures = [Figure("plot", "A plot", b"\x89PNG")]
     section = Section("One", figures=figures, tables=tables)
     text = write(tmp_path, "Title", [], [section]).read_text()
     names = {path.name for path in tmp_path.iterdir()}
@@ -105,6 +105,6 @@ def test_words_are_explained_and_code_is_set_as_code():
 def test_in_a_browser_nothing_overflows_and_no_link_leads_nowhere(tmp_path):
     stream = io.BytesIO()
     MatplotlibFigure(figsize=(16, 2)).savefig(stream, format="png")
-    pictures = [Figure("plot", "A plot", stream.getvalue(), stream.getvalue())]
+    pictures = [Figure("plot", "A plot", stream.getvalue())]
     sections = [Section("One", ["x" * 300], [WIDE, table()], pictures)]
     assert browser.faults(write(tmp_path, "Title", [], sections)) == []
