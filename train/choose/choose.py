@@ -233,7 +233,6 @@ class Choosing:
             candidates=tuple(best and promise(best[0]) for best in of_candidates),
             picks=tuple(best and best[1] for best in of_candidates),
             folds=protocol.folds,
-            agreed=protocol.agreed(task),
         )
 
 

@@ -19,13 +19,10 @@ from train.choose.evaluate import (
     fold_numbers,
 )
 from train.choose.rule import Rule
-from train.data.folds import SEED
 from train.data.groups import TRIAL, Groups
 from train.data.labels import NO_CONTACT
 from train.data.vectors import Strings
 from train.model.pipeline import Choice
-
-HALVINGS = 20
 
 
 def rule_among(
@@ -133,23 +130,6 @@ class Protocol:
     def accuracy(self, task: str) -> Result:
         """The nested accuracy of the choice."""
         return self.table.answered(task, self.places(task, self.rule(task)))
-
-    def agreed(self, task: str) -> int:
-        """In how many of `HALVINGS` divisions of the folds into two halves these choose
-        the same features and projection."""
-        answers = self.answers(task)
-        rule = self.rule(task)
-        numbers = fold_numbers(self.folds)
-        draw = np.random.default_rng(SEED)
-        agreed = 0
-        for _ in range(HALVINGS):
-            half = np.isin(self.folds, draw.permutation(numbers)[::2])
-            kinds = set()
-            for part in (half, ~half):
-                choice = self.table.choices[task][rule.choose(answers[:, part])]
-                kinds.add((choice.features, choice.projection))
-            agreed += len(kinds) == 1
-        return agreed
 
     def of_candidate(
         self, task: str, candidate: Candidate

@@ -27,7 +27,6 @@ class Chosen:
             task alone; None where it was dropped, or is none for the task.
         picks: the best settings of each candidate, likewise.
         folds: (n,) of `accuracy`.
-        agreed: see `Protocol.agreed`.
         by_fold: [fold]{task: the choice without the fold's trials}, whose decisions
             `accuracy` counts: those of the task and of the tasks that are decided
             together with it.
@@ -40,7 +39,6 @@ class Chosen:
     candidates: tuple[Promise | None, ...] = ()
     picks: tuple[Choice | None, ...] = ()
     folds: Integers = field(default_factory=lambda: np.zeros(0, np.int64), repr=False)
-    agreed: int = 0
     by_fold: tuple[dict[str, Choice], ...] = ()
 
 

@@ -34,7 +34,7 @@ from train.report import page
 from train.report.figures import confusion
 from train.report.score import interval, percent
 from train.report.section import Row, Section, Table
-from train.report.summary import Prices, accuracy, agreement, candidates, names
+from train.report.summary import Prices, accuracy, candidates, names
 from train.report.work import Workers
 
 EXPLAINED = 60
@@ -242,7 +242,7 @@ def _accuracy(exported: Exported, task: str) -> Section:
         label if label == NO_CONTACT else UNTOUCHED for label in untouched
     ]
     answers = np.array([*answer.answers[tested], *untouched_answers], dtype=str)
-    text = f"{accuracy(chosen)}; {agreement(chosen)}."
+    text = f"{accuracy(chosen)}."
     if untouched:
         text += f" The trials include {counted(len(untouched), 'recording')} without a contact."
     labels = sorted(set(truth))

@@ -9,7 +9,6 @@ from edge.commands.output import counted
 from edge.errors import printable
 from edge.tools.info import doubt
 from edge.touch import measures
-from train.choose.protocols import HALVINGS
 from train.choose.settings import Chosen
 from train.data.dataset import DataSet
 from train.data.feature_sets import SETS, expand, moves
@@ -46,31 +45,22 @@ def summary(fitted: Fitted, most_lines: int | None = None) -> list[str]:
 
 
 def details(fitted: Fitted, prices: Prices) -> list[str]:
-    """The candidates, how well halves of the folds agree, the settings of early
-    decisions, and the features with their units, as lines of text."""
+    """The candidates, the settings of early decisions, and the features with their
+    units, as lines of text."""
     lines = [
         candidates(fitted, prices).frame.to_string(index=False),
         "* chosen; in brackets, the 95 % interval of the accuracy on other trials; "
         "- dropped after a few folds, as behind or no better than a cheaper one",
     ]
-    for task, chosen in fitted.chosen.items():
-        lines.append(f"{task}: {agreement(chosen)}")
-        if fitted.early is not None:
-            early = _described(fitted.early.choices[task], fitted)
-            lines.append(f"  before {fitted.window_s:g} s: {early}")
+    if fitted.early is not None:
+        before = f"before {fitted.window_s:g} s"
+        for task, choice in fitted.early.choices.items():
+            lines.append(f"{task}, {before}: {_described(choice, fitted)}")
     lines += _by_unit(fitted.dataset.units)
     if any(map(moves, map(measures.feature, fitted.dataset.names))):
         frame = "along the skin" if fitted.dataset.chain is None else "in the world"
         lines.append(f"contact motion is measured {frame}")
     return lines
-
-
-def agreement(chosen: Chosen) -> str:
-    """How often halves of the folds agree on a task's choice, in words."""
-    return (
-        "halves of the folds choose the same features and projection in "
-        f"{chosen.agreed} of {HALVINGS} divisions"
-    )
 
 
 def _by_unit(units: Mapping[str, str]) -> list[str]:

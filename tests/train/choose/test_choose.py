@@ -11,7 +11,7 @@ from edge.saving import save
 from edge.statistics import wilson
 from train.choose.choose import decided_together
 from train.choose.evaluate import AnswerTable, Promise
-from train.choose.protocols import HALVINGS, Protocol, rule_among
+from train.choose.protocols import Protocol, rule_among
 from train.choose.rule import Rule
 from train.choose.settings import Chosen
 from train.data.groups import Groups
@@ -60,21 +60,6 @@ def test_tasks_with_groups_share_the_best_mean_of_both_protocols():
     assert by_groups.accuracy("u").accuracy == 8 / 12
     alone = replace(by_groups, sharing="t")
     assert alone.answers("t").mean(axis=1).tolist() == [0.5, 0.5]
-
-
-def test_halves_of_the_folds_agree_where_one_candidate_is_right_in_all_of_them():
-    choices = [Choice("IV", 1, 1, features=(name,)) for name in TWO]
-    folds = np.arange(40) // 10
-    best = np.stack([folds >= 0, folds < 0])
-    mixed = np.stack([folds < 2, folds >= 2])
-
-    def agreed(right):
-        table = AnswerTable(folds, {"t": choices}, {"t": np.stack([right] * 4)})
-        return Protocol(table, most_accurate).agreed("t")
-
-    assert agreed(best) == HALVINGS
-    # They differ where a half has both folds in which one of the two is right.
-    assert 0 < agreed(mixed) < HALVINGS
 
 
 def test_among_few_trials_the_most_accurate_is_chosen_whatever_its_price():
