@@ -10,7 +10,7 @@ from train.choose.settings import Chosen
 from train.data.dataset import DataSet
 from train.data.vectors import Vectors
 from train.model.pipeline import Choice, ContactClassifier
-from train.model.stopping import Early, SequentialClassifier
+from train.model.stopping import EarlySettings, SequentialClassifier
 
 
 @dataclass(frozen=True)
@@ -42,7 +42,7 @@ class Fitted:
     notes: tuple[str, ...] = ()
 
     @property
-    def early(self) -> Early | None:
+    def early(self) -> EarlySettings | None:
         """Settings of the decision points before the full window, where these have
         their own."""
         return None if self.sequential is None else self.sequential.early

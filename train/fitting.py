@@ -162,15 +162,15 @@ def calibrate(
         drawn=are_drawn(dataset),
         heading="calibrating" * options.progress,
     )
-    grouped = [t for t, chosen in settings.chosen.items() if chosen.left_out != TRIAL]
+    grouped = [t for t, chosen in settings.chosen.items() if chosen.held_out != TRIAL]
     return classifier.fit(at_points, y, settings.folds, settings.without, grouped)
 
 
 def _of_unseen(settings: Settings, options: FitOptions) -> list[str]:
     """How to choose settings for recorded objects instead, where they are chosen for
     others."""
-    left_out = {chosen.left_out for chosen in settings.chosen.values()}
-    if options.quick or left_out == {TRIAL}:
+    held_out = {chosen.held_out for chosen in settings.chosen.values()}
+    if options.quick or held_out == {TRIAL}:
         return []
     return [
         "the settings are chosen for unseen objects; `--leave-out trial` chooses "

@@ -14,7 +14,7 @@ from train.choose.candidates import candidates, features_of
 from train.choose.choose import Choosing
 from train.choose.options import FitOptions
 from train.data import thresholds
-from train.data.contacts import Untouched
+from train.data.contacts import NoContactFound
 from train.data.dataset import DataSet, Measurement, Recordings, load_trials
 from train.data.groups import Divisions, are_drawn, kinds_of
 from train.data.labels import NO_CONTACT
@@ -128,7 +128,7 @@ def choosing_of(dataset: DataSet, y: Labels, options: FitOptions) -> Choosing:
     if options.k is not None and not 1 <= options.k <= most:
         raise InputError(
             f"k must be 1 to {most}, the trials that remain of "
-            f"{len(divisions.folds)} where some are left out, not {options.k}"
+            f"{len(divisions.folds)} where some are held out, not {options.k}"
         )
     tried = candidates(
         y,
@@ -201,7 +201,7 @@ def by_noise(
     if "threshold_counts" in recordings.of_owner[0].meta.get("skin", {}):
         try:
             load(levels)
-        except Untouched:
+        except NoContactFound:
             reason = "no recording has a contact at its own thresholds"
         else:
             return levels, []

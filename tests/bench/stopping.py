@@ -33,7 +33,7 @@ from train.model.rules import NEVER, THRESHOLDS
 from train.report.work import Workers
 from train.tradeoff.choices import WINDOWS_S as DECISION_POINTS_S
 from train.tradeoff.choices import followed
-from train.tradeoff.early import FOLDS, left_out
+from train.tradeoff.early import FOLDS, held_out_decisions
 
 SECONDS = np.array(DECISION_POINTS_S)
 SETS = (
@@ -154,7 +154,7 @@ def judge(data, quick, jobs):
         "tasks": tuple(y),
         "quick": quick,
     }
-    compared = left_out(dataset, folds, options, jobs)
+    compared = held_out_decisions(dataset, folds, options, jobs)
     cases = [(by_set, y[task], folds) for task in compared]
     rivals = Workers(jobs).map("peers", peers, cases)
     curves = {}

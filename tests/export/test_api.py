@@ -14,7 +14,8 @@ from edge.model.verify import verify
 from edge.recording import load
 from edge.saving import save
 from export import api, c_code
-from train.report.summary import names, warnings
+from train.notes import warnings
+from train.report.summary import names
 
 
 def test_a_fitted_model_is_saved_with_its_golden_outputs(fitted, tmp_path):

@@ -26,7 +26,7 @@ from tests.hard_cases.models import session
 from tests.sequential import fitted_model
 from train.data.dataset import load_trials
 from train.model.pipeline import Choice
-from train.model.stopping import Early
+from train.model.stopping import EarlySettings
 
 LABELS = {"t": np.array(["a", "b", "c"] * 15), "u": np.array(["x", "y", "y"] * 15)}
 """Labels of 45 trials for two tasks."""
@@ -106,7 +106,7 @@ def with_early_settings(early, tmp_path_factory):
         "t": Choice("IV", 6, 3, features=area),
         "u": Choice("IV", 2, 3, features=area),
     }
-    settings = Early(at_first, [at_first] * 10)
+    settings = EarlySettings(at_first, [at_first] * 10)
     path = tmp_path_factory.mktemp("early") / "model.onnx"
     return X, *fitted_model(path, early.info, choices, X, LABELS, settings)
 

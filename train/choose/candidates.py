@@ -44,8 +44,8 @@ WITH_JOINTS = (
     ("kernels", "joints"),
     ("moments", "zone_kernels", "joints"),
 )
-"""Those for recordings with joint angles, whose changes show how far the thing gave
-way. The arm tells that a thing has begun to move before the skin does, and roots let a
+"""Those for recordings with joint angles, whose changes show how far the object gave
+way. The arm tells that an object has begun to move before the skin does, and roots let a
 small motion count."""
 WITH_SHEAR = (
     ("contact", "shear"),
@@ -62,15 +62,15 @@ OF_SKIN = (
     ("sqrt_taxels", "kernels"),
 )
 OF_JOINTS = (("joints",), ("joints", "posture"))
-"""For known things, each of `OF_SKIN` is a candidate with each of these, and with shear
+"""For known objects, each of `OF_SKIN` is a candidate with each of these, and with shear
 and without, where the recordings have them."""
 DRAWN = ("contact",)
 DRAWN_WITH_JOINTS = ("contact", "joints")
-"""The combination tried for touches of simulated things that are drawn from kinds
+"""The combination tried for touches of simulated objects that are drawn from kinds
 (`kinds_of`). Joint angles at onset and single taxels say how the scene is built.
-Moments say how large and of what form a contact is, in which simulators of soft things
+Moments say how large and of what form a contact is, in which simulators of soft objects
 differ most. How far the contact turns the joints back is a second measure of how the
-thing gives way, whatever the skin."""
+object gives way, whatever the skin."""
 QUICK = 3
 """Combinations tried by a quick choice, from the first on."""
 COMPONENTS = (1, 2, 3, 4, 5, 6, 8, 10, 14, 20)
@@ -79,7 +79,7 @@ FEW_NEIGHBOURS = (1, 3, 5)
 PAPER_SCALINGS = ("none", "I", "IV", "V")
 DRAWN_SHRINKAGES = (1.0, 0.3)
 DRAWN_COMPONENTS = (1, 2, 3, 4, 6, 8, 10)
-"""Those tried for touches of simulated things of several kinds, and the most
+"""Those tried for touches of simulated objects of several kinds, and the most
 discriminants. Another physics differs most in differences that are small beside the
 features' spread."""
 
@@ -92,7 +92,7 @@ class Candidate:
         sets: names of feature sets and of single features.
         projection: one of `train.model.projection.KINDS`.
         grids: the settings tried with them.
-        known: whether it is tried for known things alone, where no groups are left out.
+        known: whether it is tried for known objects alone, where no groups are left out.
     """
 
     sets: tuple[str, ...]
@@ -151,7 +151,7 @@ class Mode:
 
     Attributes:
         usual: feature sets that are tried together.
-        known: those that are tried for known things besides.
+        known: those that are tried for known objects besides.
         shrinkages: of discriminants.
         components: numbers of coordinates.
         most_directions: of discriminants; None for all.
@@ -169,7 +169,7 @@ class Mode:
 
     @classmethod
     def drawn(cls, joints: bool) -> Mode:
-        """The mode of things that a scene drew from kinds."""
+        """The mode of objects that a scene drew from kinds."""
         return cls(
             usual=[DRAWN_WITH_JOINTS if joints else DRAWN],
             known=[],
@@ -207,7 +207,7 @@ class Mode:
         """Whether a projection of some feature sets is tried by default.
 
         Discriminants are not, for the paper's few features. A quick choice tries
-        discriminants alone for the others. So does one for simulated things, because
+        discriminants alone for the others. So does one for simulated objects, because
         principal components do not hold back the coordinates in which simulators
         differ.
         """

@@ -21,7 +21,7 @@ from train.data.vectors import Labels, Vectors
 from train.model.agreement import families
 from train.model.held_out import held_out
 from train.model.pipeline import Choice, Choices
-from train.model.stopping import Early
+from train.model.stopping import EarlySettings
 from train.progress import bar
 
 Plan = tuple[Integers, Sequence[Choices]]
@@ -35,7 +35,7 @@ class Choosing:
         dataset: measured for every candidate.
         y: {task: (n,) labels}.
         candidates: what is tried.
-        divisions: the trials that are left out together.
+        divisions: the trials that are held out together.
         samples: values of a feature.
         jobs: processes.
         progress: show progress bars on stderr.
@@ -77,7 +77,7 @@ class Choosing:
         return dataset.vectors(window_s, self._samples, self._y)
 
     def _protocols(self, vectors: Vectors, heading: str, *, nested: bool) -> Protocols:
-        """The choices by the candidates' answers to what is left out."""
+        """The choices by the candidates' answers to what is held out."""
         folds = self._divisions.folds
         further_folds = self._divisions.further
         by_trial, by_group = self._grids(graded=self._is_few and nested)
@@ -113,7 +113,7 @@ class Choosing:
         return Protocols(by_trials, by_groups, shared)
 
     def _grids(self, graded: bool) -> tuple[list[SearchGrid], list[SearchGrid]]:
-        """The grids tried with trials left out, and those tried with groups left out,
+        """The grids tried with trials held out, and those tried with groups held out,
         for which the tasks that share their settings share a space.
 
         Args:
@@ -180,7 +180,7 @@ class Choosing:
         self,
         window_s: float,
         chosen: Mapping[str, Chosen],
-    ) -> Early | None:
+    ) -> EarlySettings | None:
         """The settings of the decision points before the full window; None where no
         candidate has discriminants."""
         full = {task: settings.choice for task, settings in chosen.items()}
@@ -221,7 +221,7 @@ class Choosing:
         accuracy = promise(protocol.accuracy(task))
         by_trial = accuracy
         if protocol.groups is not None:
-            # `decided_together` counts the answers to left-out trials.
+            # `decided_together` counts the answers to held-out trials.
             total = int((trial_folds >= 0)[self._y[task] != ""].sum())
             none_right = Result(0, total, hits=np.zeros(total, dtype=bool))
             by_trial = promised(none_right, untouched)
@@ -229,7 +229,7 @@ class Choosing:
             choice=protocol.choice(task),
             accuracy=accuracy,
             by_trial=by_trial,
-            left_out=protocol.name,
+            held_out=protocol.name,
             candidates=tuple(best and promise(best[0]) for best in of_candidates),
             picks=tuple(best and best[1] for best in of_candidates),
             folds=protocol.folds,
@@ -272,7 +272,7 @@ def decided_together(
     Args:
         chosen: {task: its settings}, with the accuracies of the task by itself.
         vectors: (n, p) of the trials.
-        plans: {`left_out`: (n,) folds, and [fold]{task: the choice made without its
+        plans: {`held_out`: (n,) folds, and [fold]{task: the choice made without its
             trials}}.
         jobs: processes.
     """
@@ -281,17 +281,17 @@ def decided_together(
         together[task] = _planned(settings, plans, (task,))
     task_families = families(vectors.y)
     for task, settings in chosen.items():
-        if settings.left_out != TRIAL and not any(task in f for f in task_families):
+        if settings.held_out != TRIAL and not any(task in f for f in task_families):
             task_families.append((task,))
     for family in task_families:
         right = {}
-        for left_out in {TRIAL, *(chosen[task].left_out for task in family)}:
-            right[left_out] = _right_together(family, vectors, plans[left_out], jobs)
+        for name in {TRIAL, *(chosen[task].held_out for task in family)}:
+            right[name] = _right_together(family, vectors, plans[name], jobs)
         for task in family:
             settings = _planned(chosen[task], plans, family)
             together[task] = replace(
                 settings,
-                accuracy=_recounted(settings.accuracy, right[settings.left_out][task]),
+                accuracy=_recounted(settings.accuracy, right[settings.held_out][task]),
                 by_trial=_recounted(settings.by_trial, right[TRIAL][task]),
             )
     return together
@@ -303,7 +303,7 @@ def _planned(
     tasks: Sequence[str],
 ) -> Chosen:
     """A task's settings with `by_fold`, of the tasks that are decided together."""
-    _, by_fold = plans[settings.left_out]
+    _, by_fold = plans[settings.held_out]
     of_tasks = [_of_tasks(by_task, tasks) for by_task in by_fold]
     return replace(settings, by_fold=tuple(of_tasks))
 

@@ -1,7 +1,7 @@
 """Exact leave-one-out accuracies for all numbers of components and of neighbours at
 once.
 
-For each trial left out, scaling and components are fitted on the others. One
+For each trial held out, scaling and components are fitted on the others. One
 decomposition serves all numbers of components, as squared distances are accumulated
 over components. One sort for each number of components serves all k, as votes are
 accumulated over k.

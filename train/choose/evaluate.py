@@ -135,7 +135,7 @@ class AnswerTable:
         tested: {task: (n,) whether a trial has a label and a fold}; all where a task
             has no entry.
         repeated: tables of the same candidates by other folds, whose answers to
-            left-out trials count in the choice by all trials.
+            held-out trials count in the choice by all trials.
         grids: {task: (candidates,) the number of each one's grid}.
         running: {task: (folds + 1, candidates) whether each runs in the choice without
             a fold, and in that by all trials}; all where a task has no entry. What was
@@ -288,7 +288,7 @@ def evaluate(
 
     Args:
         vectors: (n, p) of the trials.
-        folds: (n,) from 0; -1 for trials that are never left out, nor tested.
+        folds: (n,) from 0; -1 for trials that are never held out, nor tested.
         grids: the candidates.
         jobs: processes.
         progress: called after each of the `fits`.

@@ -29,7 +29,7 @@ LONGEST_S = 60.0
 count = within(int, 1, 1_000_000)
 counts = within(int, 0, 65534)
 seconds = within(float, 0.01, LONGEST_S)
-"""The types of options that take a number of things, counts of a taxel, or seconds."""
+"""The types of options that take a whole number, counts of a taxel, or seconds."""
 
 
 def taxel(text: str) -> tuple[int, int]:

@@ -1,4 +1,4 @@
-"""What is left out to choose a task's settings and to measure them: single trials, or
+"""What is held out to choose a task's settings and to measure them: single trials, or
 entire groups of them."""
 
 from collections.abc import Iterable, Mapping, Sequence
@@ -48,16 +48,16 @@ def rule_among(
 
 @dataclass(frozen=True)
 class Protocol:
-    """The choice by answers to trials, or to entire groups of them, that are left out.
+    """The choice by answers to trials, or to entire groups of them, that are held out.
 
-    Tasks whose groups are left out share their settings: those with the best mean, over
-    these tasks, of the accuracies with trials and with groups left out. No price counts
+    Tasks whose groups are held out share their settings: those with the best mean, over
+    these tasks, of the accuracies with trials and with groups held out. No price counts
     there, as a few groups hold most errors: the standard error among trials says little.
 
     Attributes:
-        table: the answers to what is left out.
+        table: the answers to what is held out.
         rules: of the choice of a task.
-        groups: that are left out; None for single trials.
+        groups: that are held out; None for single trials.
         beside: the answers to what the other protocol leaves out; None of tasks without
             groups.
         sharing: the tasks that share their settings.
@@ -71,7 +71,7 @@ class Protocol:
 
     @property
     def name(self) -> str:
-        """What is left out."""
+        """What is held out."""
         return TRIAL if self.groups is None else self.groups.name
 
     @property
@@ -118,12 +118,12 @@ class Protocol:
         return self.table.choices[task][place]
 
     def places(self, task: str, rule: Rule) -> list[int]:
-        """[fold] the candidate chosen by a rule without what is left out."""
+        """[fold] the candidate chosen by a rule without what is held out."""
         numbers = fold_numbers(self.folds)
         return [rule.choose(self.answers_without(task, fold)) for fold in numbers]
 
     def by_fold(self, task: str) -> list[Choice]:
-        """[fold] a task's settings chosen without what is left out."""
+        """[fold] a task's settings chosen without what is held out."""
         places = self.places(task, self.rule(task))
         return [self.table.choices[task][place] for place in places]
 
@@ -148,11 +148,11 @@ class Protocol:
 
 @dataclass(frozen=True)
 class Protocols:
-    """The choices by what is left out.
+    """The choices by what is held out.
 
     Attributes:
         trials: of tasks without groups, by single trials.
-        groups: of the tasks whose groups are left out; None where there are none.
+        groups: of the tasks whose groups are held out; None where there are none.
         shared: the choice of these tasks without folds of single trials.
     """
 
@@ -185,7 +185,7 @@ def promised(result: Result, untouched: Sequence[str] = (), groups: int = 0) -> 
         result: on the trials with a contact.
         untouched: labels of the recordings without one. Missed touches count as wrong,
             and recordings of no touch as right.
-        groups: number of the groups left out; 0 for single trials.
+        groups: number of the groups held out; 0 for single trials.
     """
     right = result.right + untouched.count(NO_CONTACT)
     total = result.total + len(untouched)

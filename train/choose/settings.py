@@ -9,7 +9,7 @@ from edge.arrays import Integers
 from train.choose.candidates import Candidate
 from train.choose.evaluate import Promise
 from train.model.pipeline import Choice, Choices
-from train.model.stopping import Early
+from train.model.stopping import EarlySettings
 
 
 @dataclass(frozen=True)
@@ -18,11 +18,11 @@ class Chosen:
 
     Attributes:
         choice: the features, scaling, projection and numbers.
-        accuracy: nested accuracy of the entire choice, with entire groups left out
-            where `left_out` is not `trial`. Tasks that agree are decided together, as
+        accuracy: nested accuracy of the entire choice, with entire groups held out
+            where `held_out` is not `trial`. Tasks that agree are decided together, as
             the model does. Its interval is that of the exported model on other trials.
-        by_trial: the same with single trials left out.
-        left_out: `trial`, or the label whose groups were left out.
+        by_trial: the same with single trials held out.
+        held_out: `trial`, or the label whose groups were held out.
         candidates: nested accuracy of each candidate's own choice of numbers, by the
             task alone; None where it was dropped, or is none for the task.
         picks: the best settings of each candidate, likewise.
@@ -35,7 +35,7 @@ class Chosen:
     choice: Choice
     accuracy: Promise
     by_trial: Promise
-    left_out: str
+    held_out: str
     candidates: tuple[Promise | None, ...] = ()
     picks: tuple[Choice | None, ...] = ()
     folds: Integers = field(default_factory=lambda: np.zeros(0, np.int64), repr=False)
@@ -61,7 +61,7 @@ class Settings:
     without: list[dict[str, Choice]]
     candidates: Sequence[Candidate]
     window_s: float
-    early: Early | None = None
+    early: EarlySettings | None = None
 
     @property
     def choices(self) -> dict[str, Choice]:

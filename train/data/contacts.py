@@ -35,7 +35,7 @@ LabelledFile = tuple[Path, dict[str, str]]
 """A recording's file, and {task: label}."""
 
 
-class Untouched(InputError):
+class NoContactFound(InputError):
     """No recording has a contact at the thresholds."""
 
 
@@ -114,7 +114,7 @@ def collect(
     """The trials of recordings whose contacts were followed.
 
     Raises:
-        Untouched: no recording has a contact.
+        NoContactFound: no recording has a contact.
     """
     trials: list[Trial] = []
     untouched = []
@@ -127,7 +127,7 @@ def collect(
         for trial_labels, touch in zip(labels, touches, strict=False):
             trials.append(Trial(path, recording, trial_labels, *touch))
     if not trials:
-        raise Untouched(
+        raise NoContactFound(
             f"no contact in any of {len(recordings)} recordings; lower the threshold "
             f"of {layout.threshold_counts} counts"
         )

@@ -78,7 +78,7 @@ def _draw(
     model: Model | None,
 ) -> None:
     horizon = WINDOW_S if model is None else model.info.window_s
-    touches = [_Touch.of(*recording, horizon) for recording in recordings]
+    touches = [_Column.of(*recording, horizon) for recording in recordings]
     layout = touches[0].recording.layout
     for touch in touches:
         _require_units(touch, layout)
@@ -129,7 +129,7 @@ def contact_of(
 
 
 @dataclass(frozen=True)
-class _Touch:
+class _Column:
     """A recording, and its first contact.
 
     Attributes:
@@ -171,7 +171,7 @@ class _Touch:
         return "\n".join(filter(None, words)) or "touch"
 
 
-def _require_units(touch: _Touch, layout: SkinLayout) -> None:
+def _require_units(touch: _Column, layout: SkinLayout) -> None:
     """Refuse a touch in other units than those of a skin.
 
     Raises:
@@ -186,7 +186,7 @@ def _require_units(touch: _Touch, layout: SkinLayout) -> None:
             )
 
 
-def _decided(touch: _Touch, model: Model) -> Decided | None:
+def _decided(touch: _Column, model: Model) -> Decided | None:
     """The decision of the category, or of the first task where the model has none."""
     tasks = list(model.info.tasks)
     task = "category" if "category" in tasks else tasks[0]

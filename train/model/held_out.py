@@ -71,7 +71,7 @@ def held_out(
 
     Args:
         vectors: (decision points, n, p).
-        folds: (n,) from 0, or -1 for trials that are never left out.
+        folds: (n,) from 0, or -1 for trials that are never held out.
         runs: [run][fold][decision point]{task: Choice}.
         jobs: processes.
         heading: of a progress bar on stderr; empty for none.
@@ -104,7 +104,7 @@ def _fold(
     runs: Sequence[AtPoints],
     slopes: Sequence[Slopes],
 ) -> list[Answers]:
-    """[run] answers to the trials that are left out."""
+    """[run] answers to the trials that are held out."""
     training = vectors.part(~left_out)
     fits: list[Fits] = [{} for _ in training.X]
     by_run = []

@@ -168,7 +168,7 @@ def fittable(choices: Choices, y: Labels) -> dict[str, Choice]:
     return possible
 
 
-class Decided(NamedTuple):
+class TaskAnswers(NamedTuple):
     """A task's decisions on some vectors.
 
     Attributes:
@@ -334,7 +334,7 @@ class ContactClassifier:
         self.products_ = factors_of({task: vectors.y[task] for task in self.choices})
         return self
 
-    def decide(self, X: Floats) -> dict[str, Decided]:
+    def decide(self, X: Floats) -> dict[str, TaskAnswers]:
         """{task: decisions} on vectors (m, p), as `edge.Model` makes them of the
         graph's votes."""
         labels = {}
@@ -347,7 +347,7 @@ class ContactClassifier:
             together, nearest_answers = agreed(task, factors, distances)
             labels |= together
             distances |= nearest_answers
-        return {task: Decided(labels[task], distances[task]) for task in labels}
+        return {task: TaskAnswers(labels[task], distances[task]) for task in labels}
 
 
 def sharing_a_space(choices: Choices, vectors: Vectors) -> list[dict[str, Choice]]:

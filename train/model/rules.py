@@ -79,7 +79,7 @@ class Course:
             other task is its only part.
         wrong: (decision points, n) of each part.
         unusual: (decision points, n) whether the contact is unlike all trained ones.
-        withheld: (decision points, n) whether the task names nothing, as the thing is
+        withheld: (decision points, n) whether the task names nothing, as the object is
             unknown; None of a task that always answers.
     """
 

@@ -44,11 +44,11 @@ UNTOUCHED = "(no contact)"
 
 @dataclass(frozen=True)
 class Answers:
-    """A task's answers to left-out trials.
+    """A task's answers to held-out trials.
 
     Attributes:
         classes: the task's labels, sorted.
-        truth: (n,) labels; empty where a trial has none, or was never left out.
+        truth: (n,) labels; empty where a trial has none, or was never held out.
         answers: (n,) the answers of fits to the other trials.
         explained: {trial: explanation of its answer} for the wrong answers and some
             others.
@@ -94,30 +94,30 @@ def _without_fold(
     choices: Choices,
     tests: Mapping[str, Integers],
 ) -> dict[str, tuple[Strings, dict[int, Explanation]]]:
-    """{task: the results of `_left_out`} of tasks with the same settings, which share
-    their fits, from {task: its left-out trials}."""
+    """{task: the results of `_held_out`} of tasks with the same settings, which share
+    their fits, from {task: its held-out trials}."""
     shared = Shared(slopes_of([choices], vectors))
     return {
-        task: _left_out(vectors, task, choices, test, shared)
+        task: _held_out(vectors, task, choices, test, shared)
         for task, test in tests.items()
     }
 
 
-def _left_out(
+def _held_out(
     vectors: Vectors,
     task: str,
     choices: Choices,
     test: Integers,
     shared: Shared,
 ) -> tuple[Strings, dict[int, Explanation]]:
-    """(test,) answers to left-out trials, and explanations as `Answers` has
+    """(test,) answers to held-out trials, and explanations as `Answers` has
     them.
 
     Args:
         vectors: (n, p) of all trials.
         task: the task to answer.
-        choices: each task's settings, chosen without the left-out trials.
-        test: the left-out trials.
+        choices: each task's settings, chosen without the held-out trials.
+        test: the held-out trials.
         shared: whose fits are taken, and added to.
     """
     labels = vectors.y[task]
@@ -167,7 +167,7 @@ def _space(fitted: FittedTask, labels: Integers) -> Space:
 
 
 def answers_of(fitted: Fitted, jobs: int = 1) -> dict[str, Answers]:
-    """{task: its answers to left-out trials}, the same that the nested accuracy
+    """{task: its answers to held-out trials}, the same that the nested accuracy
     counts."""
     choices: list[Choice] = []
     for chosen in fitted.chosen.values():
@@ -185,7 +185,7 @@ def answers_of(fitted: Fitted, jobs: int = 1) -> dict[str, Answers]:
         for fold, by_task in enumerate(chosen.by_fold):
             test = np.flatnonzero(tested & (chosen.folds == fold))
             if test.size:
-                key = (chosen.left_out, fold, *by_task)
+                key = (chosen.held_out, fold, *by_task)
                 cases.setdefault(key, (by_task, {}))[1][task] = test
     without_fold = partial(_without_fold, vectors)
     of_cases = list(cases.values())
@@ -272,7 +272,7 @@ def _accuracy(exported: Exported, task: str) -> Section:
         [
             confusion(
                 f"confusion_{_file(task)}",
-                f"{task}: answers to left-out trials",
+                f"{task}: answers to held-out trials",
                 truth,
                 answers,
             )
@@ -316,7 +316,7 @@ def _wrong(exported: Exported) -> Section:
 
 
 def _features(exported: Exported) -> Section:
-    """Each feature's share in the answers to left-out trials."""
+    """Each feature's share in the answers to held-out trials."""
     fitted = exported.fitted
     dataset = fitted.dataset
     rows = []
@@ -338,7 +338,7 @@ def _features(exported: Exported) -> Section:
         "A feature's pull says how much nearer the feature brings a touch to the "
         "nearest trial with the model's answer than to the nearest trial with another "
         "label. The table gives each feature's share of all pulls, as a mean over the "
-        f"wrong answers and about {EXPLAINED} other left-out trials."
+        f"wrong answers and about {EXPLAINED} other held-out trials."
     ]
     table = Table("features", "Each feature's share of the pull", rows)
     return Section("Features", text, [table])

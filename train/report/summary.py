@@ -102,10 +102,10 @@ def accuracy(chosen: Chosen) -> str:
         f"{result.accuracy:.1%} of {result.total} trials are right (95 % interval "
         f"{interval(result)}), each held out"
     )
-    if chosen.left_out == TRIAL:
+    if chosen.held_out == TRIAL:
         return text
     alone = f"{chosen.by_trial.accuracy:.1%} where it is held out alone"
-    return f"{text} with all of its {chosen.left_out}; {alone}"
+    return f"{text} with all of its {chosen.held_out}; {alone}"
 
 
 def _described(choice: Choice, fitted: Fitted) -> str:

@@ -52,7 +52,7 @@ def methods(context: Context) -> dict[str, Callable[..., Answers]]:
 
 def tested(context: Context) -> tuple[dict[str, Answers], dict[str, Answers]]:
     """{method: its accuracy} on held-out trials, and on objects that were
-    left out, as far as the labels tell the objects."""
+    held out, as far as the labels tell the objects."""
     y = context.labels
     splits = [(y, stratified_folds(y[finest(y)]))]
     other_tasks = {task: labels for task, labels in y.items() if task != GROUP_TASK}
@@ -68,7 +68,7 @@ def tested(context: Context) -> tuple[dict[str, Answers], dict[str, Answers]]:
 
 def section(context: Context) -> Section:
     """Each method's accuracy on held-out trials, and on objects that were
-    left out."""
+    held out."""
     y = context.labels
     by_trial, by_object = tested(context)
     text = [sentence(task, by_trial, by_object) for task in y]

@@ -74,7 +74,7 @@ def papers(table: str, task: str) -> dict[str, float]:
 def difference(paper: float, ours: float, tested: int) -> tuple[float, float]:
     """95 % interval of our accuracy minus the paper's, in percentage points.
 
-    Two studies of the same thing differ by chance in both. An interval around one of
+    Two studies of the same question differ by chance in both. An interval around one of
     them alone would exclude a perfect replication one time in six (Newcombe, Statistics
     in Medicine 17, 1998, method 10, for two samples).
 

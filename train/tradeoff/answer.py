@@ -5,7 +5,7 @@ from typing import Any
 from train.report.figures import PANEL, STROKES, curve, legend, picture, spread
 from train.report.score import majority, percent, points, shares
 from train.report.section import Figure, Row, Section, Table
-from train.tradeoff.measured import Measured
+from train.tradeoff.measured import Measurements
 from train.tradeoff.uses import Use, uses
 
 TITLE_S = (0.6, 1.2)
@@ -14,7 +14,7 @@ ACROSS = 3
 """At most so many panels stand side by side."""
 
 
-def answers(measured: Measured, task: str) -> list[Row]:
+def answers(measured: Measurements, task: str) -> list[Row]:
     """The rows of a task's table: fixed windows, early decisions, and guessing."""
     rows: list[Row] = []
     for use in uses(measured, task):
@@ -32,7 +32,7 @@ def commands(use: Use) -> str:
     return ", then ".join(f"`{command}`" for command in use.commands)
 
 
-def section(measured: Measured) -> Section:
+def section(measured: Measurements) -> Section:
     """The accuracy of each task after each time, as tables and a picture."""
     return Section(
         "Accuracy after each time",
@@ -41,7 +41,7 @@ def section(measured: Measured) -> Section:
     )
 
 
-def early(measured: Measured) -> Section:
+def early(measured: Measurements) -> Section:
     """Early decisions of each task, compared with waiting for the full window."""
     rows: list[Row] = [
         {
@@ -61,14 +61,14 @@ def early(measured: Measured) -> Section:
             "enough. The mean times are those that the export of all contacts promises; "
             "rates that it does not certify have no row. Exports without a fifth of the "
             "contacts, or of the objects, decide these by its rules. A contact unlike "
-            "all trained ones waits for the full window. A thing that is unknown gets no "
+            "all trained ones waits for the full window. An object that is unknown gets no "
             "name, which counts as wrong.",
         ],
         [Table("early", "Decisions with a requested error rate", rows)],
     )
 
 
-def reasons(measured: Measured) -> Section:
+def reasons(measured: Measurements) -> Section:
     """What comes on top of the times, and the commands that export the models."""
     wire = "the time on the skin's wires, which the recordings do not name,"
     if measured.wire_s is not None:
@@ -118,7 +118,7 @@ GLOSSARY = {
         "The accuracy if all trials of an object are held out together."
     ),
     "confidence": (
-        "The calibrated probability that the label is right, if the thing is one of "
+        "The calibrated probability that the label is right, if the object is one of "
         "those in training."
     ),
     "certified": (
@@ -138,7 +138,7 @@ GLOSSARY = {
 }
 
 
-def picture_of(measured: Measured) -> Figure:
+def picture_of(measured: Measurements) -> Figure:
     """Accuracy against time in a panel for each task."""
     m = len(measured.y)
     across = m if m <= ACROSS else -(-m // 2)
@@ -162,7 +162,7 @@ def picture_of(measured: Measured) -> Figure:
     return picture("tradeoff", title, draw, 3.0 * down + 0.4, width)
 
 
-def _panel(axes: Any, task: str, measured: Measured) -> None:
+def _panel(axes: Any, task: str, measured: Measurements) -> None:
     """Draw a task's accuracy after fixed windows and with early decisions."""
     results = measured.results(task)
     chance = 100 * majority(measured.y[task]).accuracy

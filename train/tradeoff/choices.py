@@ -23,7 +23,7 @@ from train.tune import Loaded, features_tried, trials_of, windows_of
 WINDOWS_S = tuple(round(0.1 * i, 1) for i in range(2, 13))
 """Decision points of the report's early decisions."""
 CHOSEN_S = (0.2, 0.4, 0.6, 0.8, 0.9, 1.0, 1.1, 1.2)
-"""Windows of the report, closer where most things begin to move."""
+"""Windows of the report, closer where most objects begin to move."""
 FIRST_S = (0.6, WINDOW_S)
 """Those that are measured whatever the curve, beside the shortest and the longest."""
 Points = Mapping[float, Mapping[str, Chosen]]
@@ -123,4 +123,4 @@ def differ(before: Chosen, after: Chosen) -> bool:
 
 def unseen(choice: Chosen) -> float | None:
     """The accuracy on unseen objects; None if no objects could be held out."""
-    return None if choice.left_out == TRIAL else choice.accuracy.accuracy
+    return None if choice.held_out == TRIAL else choice.accuracy.accuracy

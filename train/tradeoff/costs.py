@@ -22,7 +22,7 @@ from train.report.section import Row, Section, Table
 from train.report.skins import coarser
 from train.report.work import Workers
 from train.tradeoff.choices import Points, chosen, followed
-from train.tradeoff.measured import Measured
+from train.tradeoff.measured import Measurements
 
 WAITS_S = (0.8, 0.6, 0.4)
 EVERY = (2, 4)
@@ -37,7 +37,7 @@ Hits = Mapping[tuple[Path, int], bool]
 
 
 @dataclass(frozen=True)
-class Change:
+class Saving:
     """A change, and the options of the choice made with it.
 
     Attributes:
@@ -56,7 +56,7 @@ class Change:
     fewer: bool = False
 
 
-def changes(raw: Recordings, dataset: DataSet, rate_hz: float) -> list[Change]:
+def changes(raw: Recordings, dataset: DataSet, rate_hz: float) -> list[Saving]:
     """The changes for which a choice is made again; the shorter windows are measured
     anyway.
 
@@ -69,31 +69,31 @@ def changes(raw: Recordings, dataset: DataSet, rate_hz: float) -> list[Change]:
     cases += _fewer_taxels(raw, dataset.layout)
     paper = {"features": ["paper"]}
     name = "the paper's features"
-    cases.append(Change(name, "only 3 features", dataset, options=paper))
+    cases.append(Saving(name, "only 3 features", dataset, options=paper))
     if dataset.layout.axes:
         taxels = dataset.layout.rows * dataset.layout.cols
         price = f"{4 * taxels} bytes a frame fewer"
-        cases.append(Change("no shear", price, without_shear(dataset)))
+        cases.append(Saving("no shear", price, without_shear(dataset)))
     cases += _fewer_trials(dataset)
     return cases
 
 
-def _fewer_frames(raw: Recordings, rate_hz: float) -> Iterator[Change]:
+def _fewer_frames(raw: Recordings, rate_hz: float) -> Iterator[Saving]:
     """Every n-th frame."""
     for n in EVERY:
         price = f"1/{n} of the bits on the wire"
         thinned = [part(r, slice(None, None, n)) for r in raw.recordings]
         source = replace(raw, recordings=tuple(thinned))
-        yield Change(f"{rate_hz / n:.0f} frames a second", price, source)
+        yield Saving(f"{rate_hz / n:.0f} frames a second", price, source)
 
 
-def _fewer_taxels(raw: Recordings, layout: SkinLayout) -> Iterator[Change]:
+def _fewer_taxels(raw: Recordings, layout: SkinLayout) -> Iterator[Saving]:
     """Larger taxels."""
     for skin, recordings in coarser(layout, raw.recordings):
         taxels = skin.rows * skin.cols
         price = f"{taxels} of {layout.rows * layout.cols} taxels to read"
         source = replace(raw, recordings=tuple(recordings))
-        yield Change(counted(taxels, "taxel"), price, source)
+        yield Saving(counted(taxels, "taxel"), price, source)
 
 
 def without_shear(dataset: DataSet) -> DataSet:
@@ -102,7 +102,7 @@ def without_shear(dataset: DataSet) -> DataSet:
     return dataset.of(names)
 
 
-def _fewer_trials(dataset: DataSet) -> Iterator[Change]:
+def _fewer_trials(dataset: DataSet) -> Iterator[Saving]:
     """A part of the trials, as far as it suffices for a choice."""
     y = {task: dataset.labels(task) for task in dataset.tasks}
     count = len(dataset.trials)
@@ -111,7 +111,7 @@ def _fewer_trials(dataset: DataSet) -> Iterator[Change]:
         remaining = len(sample.trials)
         if remaining >= FEWEST:
             price = f"{counted(count - remaining, 'recording')} fewer"
-            yield Change(f"{remaining} of {count} trials", price, sample, fewer=True)
+            yield Saving(f"{remaining} of {count} trials", price, sample, fewer=True)
 
 
 def hits(dataset: DataSet, choices: Mapping[str, Chosen]) -> dict[str, Hits]:
@@ -128,7 +128,7 @@ def hits(dataset: DataSet, choices: Mapping[str, Chosen]) -> dict[str, Hits]:
     return of_tasks
 
 
-def answered(change: Change, like: SkinLayout) -> tuple[dict[str, Hits], float]:
+def answered(change: Saving, like: SkinLayout) -> tuple[dict[str, Hits], float]:
     """{task: hits of the choice made with a change}, and the seconds of one core that
     it took.
 
@@ -179,16 +179,16 @@ def measure(
     full = hits(dataset, windows[WINDOW_S])
     rows = []
     for w in filter(windows.__contains__, WAITS_S):
-        wait = Change(f"waiting {w:g} s", f"{WINDOW_S - w:.1f} s sooner", dataset)
+        wait = Saving(f"waiting {w:g} s", f"{WINDOW_S - w:.1f} s sooner", dataset)
         rows.append(row_of(wait, full, hits(dataset, windows[w]), 0.0))
-    thorough = Change(
+    thorough = Saving(
         "all candidates", "longer training", raw, options={"quick": False}
     )
     cases = changes(raw, dataset, rate_hz)
     if quick:
         # The longest first: it runs beside the others.
         cases.insert(0, thorough)
-    unchanged = Change("the quick choice", "", dataset)
+    unchanged = Saving("the quick choice", "", dataset)
     jobs = [(case, dataset.layout) for case in (unchanged, *cases)]
     (base, _), *afters = workers.map("costs", answered, jobs)
     if not quick:
@@ -199,7 +199,7 @@ def measure(
 
 
 def row_of(
-    case: Change,
+    case: Saving,
     base: Mapping[str, Hits],
     after: Mapping[str, Hits],
     seconds: float,
@@ -215,13 +215,13 @@ def row_of(
     return row
 
 
-def section(measured: Measured) -> Section:
+def section(measured: Measurements) -> Section:
     """A row for each change."""
     title = "Accuracy gained or lost by each change"
     return Section(
         "Savings, and the accuracy that they cost",
         [
-            f"Each row changes one thing of the choice at {WINDOW_S:g} s: a shorter wait "
+            f"Each row changes one setting of the choice at {WINDOW_S:g} s: a shorter wait "
             "of the choice above, everything else of the quick choice, which is made "
             "again with the features that suit the change. A larger taxel reads the sum "
             "of the forces on its area. The last section explains points and intervals.",

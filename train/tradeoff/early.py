@@ -28,17 +28,17 @@ ERRORS = (0.05, 0.1, 0.15, 0.2, 0.25, 0.3)
 
 
 @dataclass(frozen=True)
-class Certified:
+class EarlyDecisions:
     """Decisions with an error rate that an export certifies.
 
     Attributes:
         error: the requested rate.
         mean_s: mean time to decision, which the exported model promises.
         right: (n,) whether each contact is decided rightly by a model without it. A
-            thing that is unknown gets no name, which counts as wrong.
+            object that is unknown gets no name, which counts as wrong.
         waited: (n,) whether the same contact is decided rightly at the full window.
         unseen: (m,) whether each contact is decided rightly by a model without its
-            object; None where no objects could be left out.
+            object; None where no objects could be held out.
     """
 
     error: float
@@ -65,7 +65,7 @@ def certified(
     *,
     quick: bool = True,
     jobs: int = 1,
-) -> dict[str, list[Certified]]:
+) -> dict[str, list[EarlyDecisions]]:
     """{task: its decisions at each error rate that an export certifies}.
 
     Args:
@@ -84,11 +84,11 @@ def certified(
     model = fit(dataset, **options, jobs=jobs).sequential
     assert model is not None
     folds = stratified_folds(y[finest(y)], FOLDS)
-    known = left_out(dataset, folds, options, jobs)
-    unseen: dict[str, LeftOut] = {}
+    known = held_out_decisions(dataset, folds, options, jobs)
+    unseen: dict[str, HeldOutDecisions] = {}
     groups = groups_of(dataset, y, LEAVE_OUT, quick=True)
     if groups is not None:
-        by_task = left_out(dataset, groups.folds, options, jobs)
+        by_task = held_out_decisions(dataset, groups.folds, options, jobs)
         unseen = {task: by_task[task] for task in groups.tasks}
     return {
         task: at_errors(stopping, known[task], unseen.get(task))
@@ -97,7 +97,7 @@ def certified(
 
 
 @dataclass(frozen=True)
-class LeftOut:
+class HeldOutDecisions:
     """A task's decisions by models that were fitted without what they decide.
 
     Attributes:
@@ -109,9 +109,9 @@ class LeftOut:
     course: Course
 
 
-def left_out(
+def held_out_decisions(
     dataset: DataSet, folds: Integers, options: Mapping[str, Any], jobs: int
-) -> dict[str, LeftOut]:
+) -> dict[str, HeldOutDecisions]:
     """{task: decisions of the trials of each fold (n,) by an export of the others}.
 
     Args:
@@ -129,7 +129,7 @@ def left_out(
 
 def _without(
     dataset: DataSet, test: Booleans, options: Mapping[str, Any]
-) -> dict[str, LeftOut]:
+) -> dict[str, HeldOutDecisions]:
     """{task: the decisions of some trials by an export of the others}."""
     fitted = fit(dataset.part(~test), **options, jobs=1)
     model = fitted.sequential
@@ -140,10 +140,12 @@ def _without(
     new = np.stack([test_set.features(s, fitted.samples, names) for s in points])
     truth = {task: test_set.labels(task) for task in model.choices}
     right, _, courses = model.judged(new, truth)
-    return {task: LeftOut(right[task], course) for task, course in courses.items()}
+    return {
+        task: HeldOutDecisions(right[task], course) for task, course in courses.items()
+    }
 
 
-def _joined(folds: Sequence[LeftOut]) -> LeftOut:
+def _joined(folds: Sequence[HeldOutDecisions]) -> HeldOutDecisions:
     """The decisions of several folds together."""
     courses = [fold.course for fold in folds]
     confidences = zip(*(course.confidences for course in courses), strict=True)
@@ -155,19 +157,19 @@ def _joined(folds: Sequence[LeftOut]) -> LeftOut:
         unusual=np.hstack([course.unusual for course in courses]),
         withheld=np.hstack(withheld) if withheld else None,
     )
-    return LeftOut(np.hstack([fold.right for fold in folds]), course)
+    return HeldOutDecisions(np.hstack([fold.right for fold in folds]), course)
 
 
 def at_errors(
-    stopping: Stopping, known: LeftOut, unseen: LeftOut | None = None
-) -> list[Certified]:
+    stopping: Stopping, known: HeldOutDecisions, unseen: HeldOutDecisions | None = None
+) -> list[EarlyDecisions]:
     """The decisions at each error rate that a model certifies; one rule that serves
     several rates stands at the smallest.
 
     Args:
         stopping: the model's rules.
         known: decisions of known objects.
-        unseen: those of objects that were left out.
+        unseen: those of objects that were held out.
     """
     waiting, _ = candidates(len(known.right))
     _, late = known.course.under(waiting)
@@ -181,5 +183,5 @@ def at_errors(
         if unseen is not None:
             _, missed = unseen.course.under(rule)
             right = ~missed
-        decisions.append(Certified(error, rule.mean_s, ~wrong, ~late, right))
+        decisions.append(EarlyDecisions(error, rule.mean_s, ~wrong, ~late, right))
     return decisions

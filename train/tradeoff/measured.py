@@ -9,11 +9,11 @@ from train.report.section import Row
 from train.tradeoff.board import Board
 from train.tradeoff.choices import Points
 from train.tradeoff.commands import Commands
-from train.tradeoff.early import Certified
+from train.tradeoff.early import EarlyDecisions
 
 
 @dataclass(frozen=True)
-class Measured:
+class Measurements:
     """Accuracies and times of one data set on one board.
 
     Attributes:
@@ -33,11 +33,11 @@ class Measured:
     board: Board
     wire_s: float | None
     points: Points
-    certified: Mapping[str, Sequence[Certified]]
+    certified: Mapping[str, Sequence[EarlyDecisions]]
     costs: Sequence[Row]
     commands: Commands
     notes: Sequence[str] = ()
 
     def results(self, task: str) -> dict[float, Result]:
-        """{window: accuracy of a task on left-out trials}."""
+        """{window: accuracy of a task on held-out trials}."""
         return {window: tasks[task].by_trial for window, tasks in self.points.items()}

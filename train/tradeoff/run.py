@@ -21,9 +21,9 @@ from train.tradeoff import board as boards
 from train.tradeoff.choices import WINDOWS_S, choices_at, prepared
 from train.tradeoff.commands import Commands
 from train.tradeoff.front import ParetoFront
-from train.tradeoff.measured import Measured
+from train.tradeoff.measured import Measurements
 
-SECTIONS: tuple[Callable[[Measured], Section], ...] = (
+SECTIONS: tuple[Callable[[Measurements], Section], ...] = (
     answer.section,
     costs.section,
     answer.reasons,
@@ -93,7 +93,7 @@ def tradeoff(data: Sequence[str], out: Path, board_path: str, options: Options) 
     certified = early.certified(dataset, WINDOWS_S, quick=quick, jobs=options.jobs)
     rows = costs.measure(raw, dataset, points, rate, workers, quick=quick)
     order = sorted(dataset.tasks, key=lambda task: (task != main, task))
-    measured = Measured(
+    measured = Measurements(
         y={task: dataset.labels(task) for task in order},
         board=board,
         wire_s=_wire_time_s(raw.recordings, rate),
@@ -145,7 +145,7 @@ def _main_task(dataset: DataSet, task: str | None) -> str:
     return main
 
 
-def _write(measured: Measured, out: Path, contacts: str) -> Path:
+def _write(measured: Measurements, out: Path, contacts: str) -> Path:
     """Write the report on so many contacts."""
     lead = [
         "How long must a robot wait before it knows what its arm has touched? This "

@@ -4,8 +4,8 @@ from dataclasses import dataclass
 
 from train.choose.evaluate import Result
 from train.tradeoff.choices import WINDOWS_S, unseen
-from train.tradeoff.early import Certified
-from train.tradeoff.measured import Measured
+from train.tradeoff.early import EarlyDecisions
+from train.tradeoff.measured import Measurements
 
 EARLY = (
     "--leave-out trial",
@@ -33,7 +33,7 @@ class Use:
     commands: tuple[str, ...]
 
 
-def fixed(measured: Measured, task: str, window_s: float) -> Use:
+def fixed(measured: Measurements, task: str, window_s: float) -> Use:
     """The decision of a task after a fixed window."""
     choice = measured.points[window_s][task]
     return Use(
@@ -45,7 +45,7 @@ def fixed(measured: Measured, task: str, window_s: float) -> Use:
     )
 
 
-def early(measured: Measured, rule: Certified) -> Use:
+def early(measured: Measurements, rule: EarlyDecisions) -> Use:
     """The early decision with an error rate."""
     return Use(
         f"early, at most {rule.error:.0%} wrong",
@@ -56,7 +56,7 @@ def early(measured: Measured, rule: Certified) -> Use:
     )
 
 
-def uses(measured: Measured, task: str) -> list[Use]:
+def uses(measured: Measurements, task: str) -> list[Use]:
     """Every fixed window and every early decision of a task, on the same contacts."""
     windows = [fixed(measured, task, window) for window in measured.results(task)]
     rules = measured.certified[task]
