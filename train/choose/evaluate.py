@@ -36,7 +36,7 @@ from train.choose.halving import (
     folds_near,
     rungs,
 )
-from train.choose.rule import MOST_ACCURATE, Rule
+from train.choose.rule import Rule
 from train.choose.search import SearchGrid
 from train.data.vectors import Strings, Vectors
 from train.model.pipeline import Choice
@@ -248,20 +248,6 @@ class AnswerTable:
         hits = hits[tested]
         usual = self.choices[task][int(np.bincount(candidates).argmax())]
         return Result(int(hits.sum()), len(hits), usual.components, usual.k, hits=hits)
-
-
-def chosen_by_fold(
-    table: AnswerTable, task: str, rule: Rule = MOST_ACCURATE
-) -> list[int]:
-    """[fold] the candidate chosen without the trials of a fold, nor fits to them."""
-    return [rule.choose(table.nested(task, fold)) for fold in fold_numbers(table.folds)]
-
-
-def nested_accuracy(
-    table: AnswerTable, task: str, rule: Rule = MOST_ACCURATE
-) -> Result:
-    """The accuracy of the choice itself, with the numbers that it most often takes."""
-    return table.answered(task, chosen_by_fold(table, task, rule))
 
 
 def fold_numbers(folds: Integers) -> range:
