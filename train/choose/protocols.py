@@ -34,9 +34,7 @@ def rule_among(
     of about the best, or the best where trials are few.
 
     Among few trials a standard error is wide, and the cheapest within it often less
-    accurate: by 0 to 4 points on cuts of 54 trials of iCub, SDH-2 and simulated touches.
-    Their answers are graded then, which chooses better by another point; on cuts of 120
-    trials both together by 1.3 points.
+    accurate. Their answers are graded then (docs/measured.md).
 
     Args:
         choices: of the candidates.

@@ -22,9 +22,7 @@ from train.model.novelty import LEAST, UNKNOWN_RATE, limits_of
 
 SHARE = 0.1
 """Share of contacts with objects that were never met. With a larger one, doubt about the
-object says less of which names of known objects are right: with 0.15, 2.7 % of those that
-are surer than 0.95 are wrong, with 0.1 1.6 % (cody18, 14 full exports without four
-objects)."""
+object says less of which names of known objects are right (docs/measured.md)."""
 FEWEST_OBJECTS = 5
 """Where there are fewer, what remains of a fold says little of the model."""
 MOST_FOLDS = 10

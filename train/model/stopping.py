@@ -11,18 +11,14 @@ chosen, without it.
 lie than those of any other (`edge.model.info.margin`). Logistic regression turns it
 into the probability that the label is right (Platt, Probabilistic outputs for support
 vector machines, 1999), at the full window by a curve of its own, before it by one of
-all points together. A curve of each early point errs more: its mean is that of few
-trials (cody18, 140 trials: category by up to 0.10 instead of 0.07, three seeds). A label's
-distance is that of its nearest twentieth (`train.model.pipeline.label_distances`). So
-it is the same for the folds' models, which have fewer trials, as for the exported one.
+all points together. A label's distance is that of its nearest twentieth
+(`train.model.pipeline.label_distances`). So it is the same for the folds' models, which
+have fewer trials, as for the exported one.
 
 Where entire groups, such as objects, are held out for a task, its curve of the full
 window is made as if a share `SHARE` of the answers were to groups that the deciding
-model has not met. Their errors come by groups: of 18 objects, two are always wrong when
-never met, and sure. So a larger share makes both known and unseen objects err more
-(category of cody18, three seeds with 36 choices of four objects held out each: known
-0.044 instead of 0.056 half and half, unseen 0.177 instead of 0.189, where one number
-for all unseen objects, their accuracy, has 0.180).
+model has not met.
+Their errors come by groups: one that is wrong is wrong about nearly all of its trials.
 
 **Rules** are certified by `train.model.rules`. They compare the confidences of all
 decision points with one threshold, by the curve of all points together.

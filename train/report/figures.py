@@ -7,9 +7,9 @@ from typing import Any
 import matplotlib as mpl
 import numpy as np
 from matplotlib.figure import Figure as Canvas
-from sklearn.metrics import confusion_matrix
+from sklearn.metrics import ConfusionMatrixDisplay
 
-from edge.arrays import Floats, Integers
+from edge.arrays import Floats
 from train.choose.evaluate import Result
 from train.data.vectors import Strings
 from train.report.section import Figure
@@ -38,10 +38,6 @@ PANEL = 3.6
 """Inches."""
 MATRIX_TEXT = 20
 """A confusion matrix of more classes does not show its numbers."""
-MATRIX_SHARES = 4
-"""One of at most so many classes shows shares too."""
-MANY_CLASSES = 6
-"""One of more classes has smaller rows."""
 
 
 def picture(
@@ -117,35 +113,20 @@ def confusion(name: str, title: str, truth: Strings, answers: Strings) -> Figure
         truth: (n,) labels.
         answers: (n,) the model's.
     """
-    classes = np.union1d(truth, answers)
-    n = len(classes)
-    counts = confusion_matrix(truth, answers, labels=classes)
-    is_large = n > MANY_CLASSES
-    style = {"rotation": 90} if is_large else {"rotation": 30, "ha": "right"}
-    small = 7 if n > MATRIX_TEXT else None
+    n = len(np.union1d(truth, answers))
 
     def draw(canvas: Any) -> None:
         axes = canvas.subplots()
-        axes.set_xticks(range(n), classes, fontsize=small, **style)
-        axes.set_yticks(range(n), classes, fontsize=small)
+        ConfusionMatrixDisplay.from_predictions(
+            truth,
+            answers,
+            ax=axes,
+            cmap="Blues",
+            colorbar=False,
+            include_values=n <= MATRIX_TEXT,
+            xticks_rotation="vertical",
+        )
         axes.set(xlabel="answer", ylabel="label")
-        _draw_matrix(axes, counts)
 
-    height = 2.4 + 0.3 * n if is_large else 2.6 + 0.45 * n
+    height = 2.6 + 0.3 * n
     return picture(name, title, draw, height, height + 1.6, {"axes.grid": False})
-
-
-def _draw_matrix(axes: Any, counts: Integers) -> None:
-    """Draw the counts of a confusion matrix, darker with their share of a row."""
-    n = len(counts)
-    shares = counts / np.maximum(counts.sum(axis=1, keepdims=True), 1)
-    axes.imshow(shares, cmap="Blues", vmin=0, vmax=1, aspect="auto")
-    if n > MATRIX_TEXT:
-        return
-    style = {"ha": "center", "va": "center"}
-    for i, j in np.argwhere(counts):
-        text = str(counts[i, j])
-        if n <= MATRIX_SHARES:
-            text += f"\n{shares[i, j]:.0%}"
-        colour = "white" if shares[i, j] > 0.55 else "black"
-        axes.text(j, i, text, color=colour, **style)
