@@ -149,20 +149,20 @@ def judged(drawn, labels):
             right[task, window] = (answered[task][0][0] == y[task]).mean()
     model = fitted.sequential
     new = drawn.pooled(POINTS_S, rest, fitted.dataset.names)
-    hits, confidences, courses = model.judged(new, y)
+    hits, confidences, series = model.judged(new, y)
     unknown = beyond(model.remoteness_.limits, model.space_.scores(new).remoteness)[-1]
     certified = []
     fronts = []
     trusted = []
     for task in y:
-        certified += certificates(task, model.stopping_[task], courses[task])
+        certified += certificates(task, model.stopping_[task], series[task])
         fronts += front_points(task, points, right)
         doubts = trust(hits[task][-1], confidences[task][-1], unknown)
         trusted.append({"task": task, **doubts})
     return certified, fronts, trusted
 
 
-def certificates(task, stopping, course):
+def certificates(task, stopping, time_series):
     """A row for each request: the certified error, the share wrong, and the promised
     and the realised mean seconds, which are missing where the request is refused. The
     first request is the smallest error that is certified."""
@@ -173,7 +173,7 @@ def certificates(task, stopping, course):
         row |= dict.fromkeys(("wrong", "promised, s", "realised, s"), np.nan)
         rule = fastest(stopping, error)
         if rule is not None:
-            at, wrong = course.under(rule)
+            at, wrong = time_series.under(rule)
             row["wrong"] = wrong.mean()
             row["promised, s"] = rule.mean_s
             row["realised, s"] = np.take(POINTS_S, at).mean()

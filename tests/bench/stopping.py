@@ -132,7 +132,7 @@ def our_curves(ours):
     for threshold in (NEVER, *THRESHOLDS.tolist()):
         rule = StoppingRule(1.0, 0.0, threshold, len(SECONDS) - 1)
         # A label counts even where the contact is unlike all trained ones.
-        stops, wrong = replace(ours.course, withheld=None).under(rule)
+        stops, wrong = replace(ours.time_series, withheld=None).under(rule)
         sure.append((SECONDS[stops].mean(), wrong.mean()))
     return {FIXED: [fixed], SURE: [sure]}
 

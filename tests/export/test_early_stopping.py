@@ -353,11 +353,11 @@ def test_the_board_decides_as_the_trials_that_certified_its_rules_were(
         task: np.array([recording.labels[task] for recording in recordings])
         for task in model.info.tasks
     }
-    _, _, courses = fitted.sequential.judged(np.array(vectors), truth)
+    _, _, series = fitted.sequential.judged(np.array(vectors), truth)
     error = max(of.rules[0].error for of in model.info.stopping.values())
     events = [decided(model, recording, error) for recording in recordings]
-    for task, course in courses.items():
-        at, wrong = course.under(fastest(model.info.stopping[task], error))
+    for task, time_series in series.items():
+        at, wrong = time_series.under(fastest(model.info.stopping[task], error))
         answers = zip(events, at, wrong, truth[task], strict=True)
         for event, point, is_wrong, label in answers:
             assert event[task].window_s == model.decision_points_s[point]

@@ -24,7 +24,7 @@ from train.data.vectors import Vectors
 from train.model.agreement import factors_of
 from train.model.held_out import HeldOut, held_out
 from train.model.pipeline import Choice, Choices
-from train.model.rules import Course
+from train.model.rules import TimeSeries
 from train.model.stopping import EarlySettings
 
 SHARES = (1 / 6, 1 / 3, 1 / 2, 2 / 3, 5 / 6)
@@ -66,10 +66,12 @@ class SureDecisions:
         """
         margins = [answered.margins[part] for part in parts]
         unknown = np.zeros(margins[0].shape, dtype=bool)
-        course = Course(margins, [~answered.right[part] for part in parts], unknown)
+        time_series = TimeSeries(
+            margins, [~answered.right[part] for part in parts], unknown
+        )
         shares = np.linspace(0.0, 1.0, THRESHOLDS)
         decided = [
-            course.under(StoppingRule(1.0, 0.0, threshold, len(seconds) - 1))
+            time_series.under(StoppingRule(1.0, 0.0, threshold, len(seconds) - 1))
             for threshold in np.quantile(margins, shares).tolist()
         ]
         at, wrong = map(np.stack, zip(*decided, strict=True))

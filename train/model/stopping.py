@@ -70,7 +70,7 @@ from train.model.novelty import (
     limits_of,
 )
 from train.model.pipeline import Choices
-from train.model.rules import RISK, Course, agreeing, candidates, certify
+from train.model.rules import RISK, TimeSeries, agreeing, candidates, certify
 from train.threads import single_thread
 
 FEWEST = 20
@@ -313,15 +313,17 @@ class SequentialClassifier:
                 self._tested[task],
             )
         doubts = self.unusual_, self.unknown_
-        courses = self._courses(scores, answered.right, doubts, self._tested)
+        series = self._series(scores, answered.right, doubts, self._tested)
         seconds = np.array(self.decision_points_s)
-        rules = {task: certify(course, seconds) for task, course in courses.items()}
+        rules = {
+            task: certify(time_series, seconds) for task, time_series in series.items()
+        }
         for task, factors in self.products_.items():
-            rules |= agreeing(task, factors, rules, courses, seconds)
+            rules |= agreeing(task, factors, rules, series, seconds)
         full, _ = candidates(len(seconds))
         certified = {}
         for task, of_task in rules.items():
-            _, wrong = courses[task].under(full)
+            _, wrong = series[task].under(full)
             certified[task] = Certified(of_task, len(wrong), int(wrong.sum()))
         return certified
 
@@ -383,8 +385,8 @@ class SequentialClassifier:
         self,
         X: Floats,
         y: Mapping[str, Strings],
-    ) -> tuple[dict[str, Booleans], dict[str, Floats], dict[str, Course]]:
-        """Hits and confidences (points, m) and course of each task, for trials that are
+    ) -> tuple[dict[str, Booleans], dict[str, Floats], dict[str, TimeSeries]]:
+        """Hits and confidences (points, m) and time series of each task, for trials that are
         new.
 
         Args:
@@ -410,22 +412,22 @@ class SequentialClassifier:
         unusual = beyond(self.novelty_.limits, scores.novelty)
         doubts = unusual, beyond(self.remoteness_.limits, scores.remoteness)
         tested = {task: y[task] != "" for task in right}
-        return right, confidence, self._courses(together, right, doubts, tested)
+        return right, confidence, self._series(together, right, doubts, tested)
 
-    def _courses(
+    def _series(
         self,
         scores: Mapping[str, Floats],
         right: Mapping[str, Booleans],
         doubts: tuple[Booleans, Booleans],
         tested: Mapping[str, Booleans],
-    ) -> dict[str, Course]:
-        """{task: its course}, from each task's own answers and confidences for rules
+    ) -> dict[str, TimeSeries]:
+        """{task: its time series}, from each task's own answers and confidences for rules
         (points, n), and whether contacts are unusual and unknown (points, n).
 
         The trials `tested` (n,) count; for a product, those that count for its factors
         too.
         """
-        courses = {}
+        series = {}
         unusual, unknown = doubts
         for task in self.choices:
             deciding = tuple(self.products_.get(task, (task,)))
@@ -433,5 +435,5 @@ class SequentialClassifier:
             sure = [scores[part][:, decided] for part in deciding]
             wrong = [~right[part][:, decided] for part in deciding]
             withheld = unknown[:, decided] if task == self._name else None
-            courses[task] = Course(sure, wrong, unusual[:, decided], withheld)
-        return courses
+            series[task] = TimeSeries(sure, wrong, unusual[:, decided], withheld)
+        return series

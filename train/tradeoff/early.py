@@ -19,7 +19,7 @@ from train.data.dataset import DataSet
 from train.data.folds import finest, stratified_folds
 from train.data.groups import LEAVE_OUT, TRIAL, groups_of
 from train.fitting import fit
-from train.model.rules import Course, candidates
+from train.model.rules import TimeSeries, candidates
 from train.report.score import paired
 from train.report.work import Workers
 
@@ -102,11 +102,11 @@ class HeldOutDecisions:
 
     Attributes:
         right: (decision points, n) whether each fixed window's label is right.
-        course: the same with confidences, which tell when a rule decides.
+        time_series: the same with confidences, which tell when a rule decides.
     """
 
     right: Booleans
-    course: Course
+    time_series: TimeSeries
 
 
 def held_out_decisions(
@@ -139,25 +139,30 @@ def _without(
     points = model.decision_points_s
     new = np.stack([test_set.features(s, fitted.samples, names) for s in points])
     truth = {task: test_set.labels(task) for task in model.choices}
-    right, _, courses = model.judged(new, truth)
+    right, _, series = model.judged(new, truth)
     return {
-        task: HeldOutDecisions(right[task], course) for task, course in courses.items()
+        task: HeldOutDecisions(right[task], time_series)
+        for task, time_series in series.items()
     }
 
 
 def _joined(folds: Sequence[HeldOutDecisions]) -> HeldOutDecisions:
     """The decisions of several folds together."""
-    courses = [fold.course for fold in folds]
-    confidences = zip(*(course.confidences for course in courses), strict=True)
-    wrong = zip(*(course.wrong for course in courses), strict=True)
-    withheld = [course.withheld for course in courses if course.withheld is not None]
-    course = Course(
+    series = [fold.time_series for fold in folds]
+    confidences = zip(*(time_series.confidences for time_series in series), strict=True)
+    wrong = zip(*(time_series.wrong for time_series in series), strict=True)
+    withheld = [
+        time_series.withheld
+        for time_series in series
+        if time_series.withheld is not None
+    ]
+    time_series = TimeSeries(
         confidences=list(map(np.hstack, confidences)),
         wrong=list(map(np.hstack, wrong)),
-        unusual=np.hstack([course.unusual for course in courses]),
+        unusual=np.hstack([time_series.unusual for time_series in series]),
         withheld=np.hstack(withheld) if withheld else None,
     )
-    return HeldOutDecisions(np.hstack([fold.right for fold in folds]), course)
+    return HeldOutDecisions(np.hstack([fold.right for fold in folds]), time_series)
 
 
 def at_errors(
@@ -172,16 +177,16 @@ def at_errors(
         unseen: those of objects that were held out.
     """
     waiting, _ = candidates(len(known.right))
-    _, late = known.course.under(waiting)
+    _, late = known.time_series.under(waiting)
     rules = {fastest(stopping, error): error for error in reversed(ERRORS)}
     decisions = []
     for rule, error in reversed(rules.items()):
         if rule is None:
             continue
-        _, wrong = known.course.under(rule)
+        _, wrong = known.time_series.under(rule)
         right = None
         if unseen is not None:
-            _, missed = unseen.course.under(rule)
+            _, missed = unseen.time_series.under(rule)
             right = ~missed
         decisions.append(EarlyDecisions(error, rule.mean_s, ~wrong, ~late, right))
     return decisions

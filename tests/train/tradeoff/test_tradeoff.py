@@ -21,7 +21,7 @@ from tests.conftest import export, rows_of, save_touches
 from tests.train.tradeoff.examples import chosen, measured, rule
 from train.data.dataset import read
 from train.data.parts import part
-from train.model.rules import NEVER, Course
+from train.model.rules import NEVER, TimeSeries
 from train.report.work import Workers
 from train.tradeoff import answer, board, choices, costs, early
 from train.tradeoff import run as running
@@ -180,9 +180,11 @@ class TestEarly:
         all others for another."""
         wrong = np.array([[True, False, False, False], [False] * 4])
         unknown = np.array([[False] * 4, [True, False, False, False]])
-        course = Course([np.full((2, 4), 0.5)], [wrong], unknown, withheld=unknown)
-        known = early.HeldOutDecisions(~wrong, course)
-        unseen = early.HeldOutDecisions(~wrong, replace(course, withheld=None))
+        time_series = TimeSeries(
+            [np.full((2, 4), 0.5)], [wrong], unknown, withheld=unknown
+        )
+        known = early.HeldOutDecisions(~wrong, time_series)
+        unseen = early.HeldOutDecisions(~wrong, replace(time_series, withheld=None))
         rules = StoppingRule(0.12, 1.2, NEVER, 1), StoppingRule(0.2, 0.6, 0.5, 1)
         stopping = Stopping((), (), (), 0.0, 0.0, 0.0, rules, 4, 0, 0.1)
         late, soon = early.at_errors(stopping, known, unseen)
