@@ -10,8 +10,8 @@ import numpy as np
 from edge.arrays import Booleans, Floats, Integers
 from train.choose.candidates import Candidate
 from train.choose.early import by_folds, early_options, points_of, settle_early
-from train.choose.evaluate import Halving, Promise, Result, evaluate, fits
-from train.choose.protocols import Protocol, Protocols, promised, rule_among
+from train.choose.evaluate import Halving, NestedAccuracy, Result, evaluate, fits
+from train.choose.protocols import Protocol, Protocols, nested_accuracy, rule_among
 from train.choose.rule import MOST_ACCURATE, Rule
 from train.choose.search import SearchGrid
 from train.choose.settings import Chosen, Settings
@@ -154,7 +154,7 @@ class Choosing:
         for task, right in self.right(window_s).items():
             result = Result(round(right.sum()), len(right))
             untouched = self._dataset.untouched_labels(task)
-            accuracies.append(promised(result, untouched).accuracy)
+            accuracies.append(nested_accuracy(result, untouched).accuracy)
         return sum(accuracies) / len(accuracies)
 
     def choose(self, window_s: float) -> Settings:
@@ -214,23 +214,23 @@ class Choosing:
         """
         untouched = self._dataset.untouched_labels(task)
         groups = protocol.count(self._y[task])
-        promise = partial(promised, untouched=untouched, groups=groups)
+        nested = partial(nested_accuracy, untouched=untouched, groups=groups)
         of_candidates = [
             protocol.of_candidate(task, candidate) for candidate in self.candidates
         ]
-        accuracy = promise(protocol.accuracy(task))
+        accuracy = nested(protocol.accuracy(task))
         by_trial = accuracy
         if protocol.groups is not None:
             # `decided_together` counts the answers to held-out trials.
             total = int((trial_folds >= 0)[self._y[task] != ""].sum())
             none_right = Result(0, total, hits=np.zeros(total, dtype=bool))
-            by_trial = promised(none_right, untouched)
+            by_trial = nested_accuracy(none_right, untouched)
         return Chosen(
             choice=protocol.choice(task),
             accuracy=accuracy,
             by_trial=by_trial,
             held_out=protocol.name,
-            candidates=tuple(best and promise(best[0]) for best in of_candidates),
+            candidates=tuple(best and nested(best[0]) for best in of_candidates),
             picks=tuple(best and best[1] for best in of_candidates),
             folds=protocol.folds,
         )
@@ -313,7 +313,7 @@ def _of_tasks(choices: Choices, tasks: Sequence[str]) -> dict[str, Choice]:
     return {task: choices[task] for task in tasks}
 
 
-def _recounted(result: Promise, hits: Booleans) -> Promise:
+def _recounted(result: NestedAccuracy, hits: Booleans) -> NestedAccuracy:
     """A result with other answers to the same trials."""
     assert result.hits is not None
     more = int(hits.sum()) - int(result.hits.sum())

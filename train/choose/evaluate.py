@@ -84,7 +84,7 @@ class Result:
 
 
 @dataclass(frozen=True)
-class Promise(Result):
+class NestedAccuracy(Result):
     """A nested accuracy with an interval for the exported model's accuracy on other
     trials.
 

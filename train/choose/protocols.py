@@ -13,7 +13,7 @@ from train.choose.candidates import Candidate, costs, places_of
 from train.choose.evaluate import (
     VARIANCE,
     AnswerTable,
-    Promise,
+    NestedAccuracy,
     Result,
     RuleOf,
     fold_numbers,
@@ -176,8 +176,10 @@ def _mean(answers: Iterable[NDArray[Any]]) -> Floats:
     return np.asarray(np.mean(list(answers), axis=0))
 
 
-def promised(result: Result, untouched: Sequence[str] = (), groups: int = 0) -> Promise:
-    """A result as a promise of the accuracy on other trials, or on other groups.
+def nested_accuracy(
+    result: Result, untouched: Sequence[str] = (), groups: int = 0
+) -> NestedAccuracy:
+    """A result with the interval of the accuracy on other trials, or on other groups.
 
     Args:
         result: on the trials with a contact.
@@ -189,4 +191,4 @@ def promised(result: Result, untouched: Sequence[str] = (), groups: int = 0) -> 
     total = result.total + len(untouched)
     variance = max(VARIANCE, total / groups if groups else 0.0)
     counted = {"right": right, "total": total, "variance": variance}
-    return Promise(**{**vars(result), **counted})
+    return NestedAccuracy(**{**vars(result), **counted})

@@ -7,7 +7,7 @@ import numpy as np
 
 from edge.arrays import Integers
 from train.choose.candidates import Candidate
-from train.choose.evaluate import Promise
+from train.choose.evaluate import NestedAccuracy
 from train.model.pipeline import Choice, Choices
 from train.model.stopping import EarlySettings
 
@@ -33,10 +33,10 @@ class Chosen:
     """
 
     choice: Choice
-    accuracy: Promise
-    by_trial: Promise
+    accuracy: NestedAccuracy
+    by_trial: NestedAccuracy
     held_out: str
-    candidates: tuple[Promise | None, ...] = ()
+    candidates: tuple[NestedAccuracy | None, ...] = ()
     picks: tuple[Choice | None, ...] = ()
     folds: Integers = field(default_factory=lambda: np.zeros(0, np.int64), repr=False)
     by_fold: tuple[dict[str, Choice], ...] = ()

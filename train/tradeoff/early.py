@@ -14,7 +14,7 @@ import numpy as np
 from edge.arrays import Booleans, Integers
 from edge.early import fastest
 from edge.model.info import Stopping
-from train.choose.evaluate import Promise, Result
+from train.choose.evaluate import NestedAccuracy, Result
 from train.data.dataset import DataSet
 from train.data.folds import finest, stratified_folds
 from train.data.groups import LEAVE_OUT, TRIAL, groups_of
@@ -50,7 +50,7 @@ class EarlyDecisions:
     @property
     def result(self) -> Result:
         """The accuracy."""
-        return Promise(int(self.right.sum()), len(self.right))
+        return NestedAccuracy(int(self.right.sum()), len(self.right))
 
     @property
     def gain(self) -> tuple[float, float, float]:

@@ -10,7 +10,7 @@ import train
 from edge.saving import save
 from edge.statistics import wilson
 from train.choose.choose import decided_together
-from train.choose.evaluate import AnswerTable, Promise
+from train.choose.evaluate import AnswerTable, NestedAccuracy
 from train.choose.protocols import Protocol, rule_among
 from train.choose.rule import Rule
 from train.choose.settings import Chosen
@@ -108,7 +108,7 @@ def hits(agreeing):
     return right
 
 
-NONE_RIGHT = Promise(0, 60, hits=np.zeros(60, dtype=bool))
+NONE_RIGHT = NestedAccuracy(0, 60, hits=np.zeros(60, dtype=bool))
 
 
 def test_tasks_that_agree_are_scored_as_they_are_decided_together(agreeing, hits):

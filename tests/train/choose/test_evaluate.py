@@ -11,7 +11,7 @@ from edge.errors import InputError
 from edge.statistics import wilson
 from train.choose.evaluate import (
     AnswerTable,
-    Promise,
+    NestedAccuracy,
     Result,
     evaluate,
     fits,
@@ -113,8 +113,8 @@ def test_nested_accuracy_is_that_of_choosing_anew_without_each_fold():
 
 def test_a_promise_is_as_wide_as_two_fifths_of_its_trials_make_it():
     assert Result(90, 100).interval == wilson(90, 100)
-    assert Promise(90, 100).interval == wilson(36, 40)
-    assert Promise(90, 100, variance=10.0).interval == wilson(9, 10)
+    assert NestedAccuracy(90, 100).interval == wilson(36, 40)
+    assert NestedAccuracy(90, 100, variance=10.0).interval == wilson(9, 10)
 
 
 def test_folds_of_groups_part_no_group():

@@ -5,7 +5,7 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from train.choose.evaluate import Promise
+from train.choose.evaluate import NestedAccuracy
 from train.choose.settings import Chosen
 from train.model.pipeline import Choice
 from train.tradeoff.commands import Commands
@@ -20,7 +20,7 @@ def chosen(right, unseen=None, of=100):
     where these were left out."""
 
     def result(count):
-        return Promise(count, of, hits=np.arange(of) < count)
+        return NestedAccuracy(count, of, hits=np.arange(of) < count)
 
     held_out = "trial" if unseen is None else "object"
     accuracy = result(right if unseen is None else unseen)
