@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from edge.errors import InputError
-from edge.tools.slips import slips, too_few
+from edge.record.slips import slips, too_few
 from edge.touch.features import WINDOW_S
 from train.choose.decision_points import decision_points, has_early_points
 from train.choose.options import FitOptions, described

@@ -1,4 +1,4 @@
-/* Rest values of taxels that follow slow drift: edge/skin/decoder.py. */
+/* Rest values of taxels that follow slow drift: edge/wire/skin/decoder.py. */
 #include "baseline.h"
 
 #define SCALE 4096

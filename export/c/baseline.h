@@ -1,4 +1,4 @@
-/* Rest values of taxels that follow slow drift, as edge/skin/decoder.py has them: a firmware may use
+/* Rest values of taxels that follow slow drift, as edge/wire/skin/decoder.py has them: a firmware may use
    this to make the counts that ec_push takes, or its own. */
 #ifndef EC_BASELINE_H
 #define EC_BASELINE_H

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 import train
-from edge.recording import load
-from edge.saving import save
+from edge.record.recording import load
+from edge.record.saving import save
 from train.model.pipeline import ContactClassifier
 from train.notes import LEAK, coarseness, posture_accuracy, warnings
 

@@ -8,7 +8,7 @@ from typing import Any
 
 from joblib import cpu_count
 
-from edge.commands.options import within
+from edge.app.options import within
 from edge.touch import measures
 from edge.touch.arm import Chain
 from edge.touch.features import SAMPLES, WINDOW_S

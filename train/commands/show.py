@@ -7,7 +7,7 @@ Draws several recordings, or the decisions of --model, side by side.
 import argparse
 from pathlib import Path
 
-from edge.commands.options import add_file, apart
+from edge.app.options import add_file, apart
 from edge.errors import InputError
 
 
@@ -35,8 +35,8 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Draw, and say where."""
-    from edge.model.model import Model
-    from edge.recording import load
+    from edge.decide.model import Model
+    from edge.record.recording import load
     from train.draw import comparison
     from train.draw.recording import draw
 

@@ -7,7 +7,7 @@ CSV, and front.json, which `edge-classify export --front` reads.
 import argparse
 
 from edge.errors import InputError
-from edge.saving import find
+from edge.record.saving import find
 from edge.writing import check_writable
 from train.report.options import add_report_options
 

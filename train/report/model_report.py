@@ -11,11 +11,11 @@ from typing import Any
 import numpy as np
 from sklearn.metrics import precision_recall_fscore_support
 
+from edge.app.commands.explain import Explanation, Space, explain
+from edge.app.commands.info import doubt
+from edge.app.output import counted
 from edge.arrays import Integers
-from edge.commands.output import counted
-from edge.model.model import Model
-from edge.tools.explain import Explanation, Space, explain
-from edge.tools.info import doubt
+from edge.decide.model import Model
 from train.data.labels import NO_CONTACT
 from train.data.vectors import Strings, Vectors
 from train.fitted import Fitted

@@ -5,9 +5,9 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from edge.commands.output import counted
+from edge.app.commands.info import doubt
+from edge.app.output import counted
 from edge.errors import printable
-from edge.tools.info import doubt
 from edge.touch import measures
 from train.choose.settings import Chosen
 from train.data.dataset import DataSet

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from edge.commands.output import counted
+from edge.app.output import counted
 from edge.touch.features import WINDOW_S
 from edge.touch.layout import SkinLayout
 from edge.touch.measures import OF_SHEAR, feature

@@ -8,9 +8,9 @@ from pathlib import Path
 
 import numpy as np
 
-from edge.commands.output import counted
+from edge.app.output import counted
 from edge.errors import InputError
-from edge.recording import Recording
+from edge.record.recording import Recording
 from edge.writing import write_whole
 from train.data.dataset import DataSet, read
 from train.report.page import write

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 import train
-from edge.saving import save
-from edge.statistics import wilson
+from edge.decide.statistics import wilson
+from edge.record.saving import save
 from train.choose.choose import decided_together
 from train.choose.evaluate import AnswerTable, NestedAccuracy
 from train.choose.protocols import Protocol, rule_among
