@@ -298,6 +298,7 @@ def test_lone_and_held_taxels_and_drift_are_those_of_python(tmp_path):
     """One is alone for three seconds and is broken, one from the start for half of one;
     a region is held for thirteen, and all drift."""
     file = FILES["serial"]
+    file = replace(file, signal=replace(file.signal, drift_counts_per_s=20.0))
 
     def scene(t):
         counts = np.full(file.layout.shape, int(t), np.uint16)
