@@ -22,11 +22,13 @@ from edge.labels import read_table
 from edge.model.model import Model
 from edge.recording import load
 from edge.saving import find, listed
+from edge.skin import file as skinfile
 from edge.tools.replay import Summary, compared, decide
 from edge.tools.slips import counts_text
 from edge.tools.trial_options import add_arm, open_arm
 from edge.touch import measures
 from edge.touch.features import WINDOW_S
+from edge.touch.layout import for_device
 from edge.writing import check_writable
 from export.api import measure, save
 from train.choose.choose import SECOND_WORTH
@@ -76,7 +78,6 @@ OPTIONS: dict[str, dict[str, Any]] = {
     # The recordings, the model and its tasks, and the settings that can be held fixed.
     "--data": {
         "nargs": "+",
-        "required": True,
         "metavar": "REC",
         "help": ".npz recordings or folders",
     },
@@ -202,6 +203,11 @@ OPTIONS: dict[str, dict[str, Any]] = {
         "metavar": "DIR",
         "help": "also write the model as C99 for a microcontroller, into this folder",
     },
+    "--skin": {
+        "metavar": "skin.toml",
+        "help": "with --c: also write the skin as C99, from its chips to frames; without --data "
+        "it is written alone, as a recorder",
+    },
     "--c-error": {
         "type": within(float, 1e-6, 1.0 - 1e-6),
         "metavar": "RATE",
@@ -234,6 +240,10 @@ def parser() -> argparse.ArgumentParser:
 def run(arguments: argparse.Namespace) -> int:
     """Fit, write and report."""
     _check_options(arguments)
+    if not arguments.data:
+        check_writable(arguments.c)
+        _write_skin(arguments)
+        return 0
     # What may fail does so before the work, which may take an hour.
     for folder in filter(None, (arguments.out, arguments.c)):
         check_writable(folder)
@@ -268,6 +278,19 @@ def _write_c(arguments: argparse.Namespace, model: Model) -> None:
         from export.c_code import export
 
         print(export(model, arguments.c, arguments.c_error, arguments.flash))
+        _write_skin(arguments, model)
+
+
+def _write_skin(arguments: argparse.Namespace, model: Model | None = None) -> None:
+    """Write the skin in C, where that is asked for."""
+    if arguments.skin:
+        from export import skin_code
+
+        file = skinfile.load(arguments.skin)
+        counts = skin_code.UNREADABLE
+        if model is not None:
+            counts = for_device(model.info.layout, file.layout).threshold_counts
+        print(skin_code.export(file, arguments.c, counts))
 
 
 def _check_options(arguments: argparse.Namespace) -> None:
@@ -277,8 +300,13 @@ def _check_options(arguments: argparse.Namespace) -> None:
             "--compare needs --test: only recordings that neither model was fitted on "
             "tell which is better"
         )
-    if (arguments.c_error or arguments.flash) and not arguments.c:
-        raise InputError("--c-error and --flash need --c DIR")
+    of_c = arguments.c_error or arguments.flash or arguments.skin
+    if of_c and not arguments.c:
+        raise InputError("--c-error, --flash and --skin need --c DIR")
+    if not (arguments.data or arguments.skin):
+        raise InputError(
+            "give --data REC, or --c DIR --skin skin.toml for the skin alone"
+        )
 
 
 def _check_apart(data: list[str], held_out: Sequence[Path]) -> None:

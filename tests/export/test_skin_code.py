@@ -21,6 +21,7 @@ from edge.skin.decoder import dead_band, stuck_limits
 from edge.skin.file import TaxelCalibration
 from edge.skin.skin import Skin
 from export import skin_code
+from export.cli import main
 from tests.edge.skin.test_bus_reader import SMALL
 from tests.export.microcontroller.machine import COMMON, HERE
 from tests.faults import KINDS, SKINS
@@ -388,3 +389,17 @@ def test_what_c_lacks_is_one_sentence(tmp_path):
         InputError, match="cannot be written in C, which reads one axis"
     ):
         skin_code.export(replace(SMALL, layout=layout), tmp_path)
+
+
+def test_the_command_writes_a_recorder_whose_skin_file_can_be_read(tmp_path, capsys):
+    skin = skinfile.shipped("mpr121")
+    assert main(["--c", str(tmp_path), "--skin", str(skin)]) == 0
+    assert "record with record.toml" in capsys.readouterr().out
+    file = skinfile.load(skin)
+    recorder = skinfile.load(tmp_path / "record.toml")
+    assert recorder.layout == file.layout
+    assert recorder.reading == file.reading
+    assert recorder.chips[0].sign == -1
+    assert recorder.buses[0].serial
+    assert main([]) == 2
+    assert "give --data REC" in capsys.readouterr().err
