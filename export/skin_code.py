@@ -128,7 +128,7 @@ def _numbers(file: SkinFile, hz: int) -> dict[str, Any]:
         "frames_of_conversion": 1 + math.ceil(decoder.CONVERSION_S * rate_hz),
         "chance": math.exp(decoder.LOG_CHANCE),
         "repeats_of_1": 0.5 / math.sqrt(math.pi),
-        "spreads": int(calibrate.SPREADS),
+        "standing_out": int(calibrate.SPREADS),
         "ad7147_identity": ad7147.IDENTITY,
         "mpr121_saturated": mpr121.SATURATED,
         "dead_band_sigma": signal.dead_band_sigma,

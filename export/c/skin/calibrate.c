@@ -167,7 +167,7 @@ static void find_changes(int32_t changes[EC_TAXELS]) {
     for (uint16_t i = 0; i < c; i++) is_first &= ec_chips[i].kind != ec_chips[c].kind;
     if (!is_first) continue;
     those.middle = twice_median(rest_of, &those) / 2;
-    int32_t usual = EC_SPREADS * twice_median(away_of, &those) / 2;
+    int32_t usual = EC_STANDING_OUT * twice_median(away_of, &those) / 2;
     for (uint32_t i = 0; i < EC_TAXELS; i++) {
       int32_t beyond = (measured.rest[i] - those.middle) * ec_signs[i] - usual;
       if (kinds[i] == those.kind && ec_skin_alive[i] && beyond > 0) changes[i] = beyond;
