@@ -11,7 +11,10 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from edge.bus.crc import crc16, sealed
 from edge.bus.protocol import BusError, read, write
+from edge.bus.serial_bus import decode, encode
+from edge.chips import block
 from edge.commands import calibrate
 from edge.errors import EdgeError, InputError
 from edge.fake.clock import Hand, VirtualClock
@@ -389,6 +392,32 @@ def test_what_c_lacks_is_one_sentence(tmp_path):
         InputError, match="cannot be written in C, which reads one axis"
     ):
         skin_code.export(replace(SMALL, layout=layout), tmp_path)
+
+
+def test_a_recorder_serves_raw_values_as_a_block_and_65535_of_what_it_cannot_read(
+    tmp_path,
+):
+    file = FILES["one small bus"]
+    wired = Wired(file, touches(file))
+    library = Library(tmp_path, file, wired)
+    library.start()
+    wired.inject([Fault(address=0x2C)])
+    *_, raw, could_read = library.read()
+    answers = []
+    for pointer, tag in ((0x00, 7), (0x10, 8), (0x77, 9)):
+        out = bytearray()
+        put = ctypes.CFUNCTYPE(None, ctypes.c_uint8)(out.append)
+        for byte in b"\5\0" + encode(sealed(bytes([pointer, tag]))):
+            library.c.ec_record(byte, put)
+        answers.append(decode(bytes(out[:-1])))
+    names, frame, unknown = answers
+    assert names == b"\7" + block.identity(raw.size, 16)
+    assert frame[:3] == b"\x08\0\1"
+    assert crc16(frame[1:]) == 0
+    sent = np.frombuffer(frame[3:-2], ">u2").reshape(raw.shape)
+    assert not could_read.all()
+    assert (sent == np.where(could_read, raw, 65535)).all()
+    assert unknown == b""
 
 
 def test_the_command_writes_a_recorder_whose_skin_file_can_be_read(tmp_path, capsys):
