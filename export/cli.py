@@ -277,8 +277,8 @@ def _write_c(arguments: argparse.Namespace, model: Model) -> None:
     if arguments.c:
         from export.c_code import export
 
-        print(export(model, arguments.c, arguments.c_error, arguments.flash))
         _write_skin(arguments, model)
+        print(export(model, arguments.c, arguments.c_error, arguments.flash))
 
 
 def _write_skin(arguments: argparse.Namespace, model: Model | None = None) -> None:
@@ -289,7 +289,13 @@ def _write_skin(arguments: argparse.Namespace, model: Model | None = None) -> No
         file = skinfile.load(arguments.skin)
         counts = skin_code.UNREADABLE
         if model is not None:
-            counts = for_device(model.info.layout, file.layout).threshold_counts
+            layout = model.info.layout
+            counts = for_device(layout, file.layout).threshold_counts
+            if file.layout.counts_per_newton != layout.counts_per_newton:
+                raise InputError(
+                    f"{arguments.skin}: counts_per_newton differs from that of the "
+                    "recordings, and C converts no counts; give the skin theirs"
+                )
         print(skin_code.export(file, arguments.c, counts))
 
 

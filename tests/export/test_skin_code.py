@@ -5,12 +5,14 @@ import ctypes
 import math
 import shutil
 import subprocess
+from argparse import Namespace
 from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
+from edge import demo
 from edge.bus.crc import crc16, sealed
 from edge.bus.protocol import BusError, read, write
 from edge.bus.serial_bus import decode, encode
@@ -19,11 +21,13 @@ from edge.commands import calibrate
 from edge.errors import EdgeError, InputError
 from edge.fake.clock import Hand, VirtualClock
 from edge.fake.player import calibrated, fake_buses
+from edge.model.model import Model
 from edge.skin import file as skinfile
 from edge.skin.decoder import dead_band, stuck_limits
 from edge.skin.file import TaxelCalibration
 from edge.skin.skin import Skin
 from export import skin_code
+from export.cli import _write_c as write_c
 from export.cli import main
 from tests.edge.skin.test_bus_reader import SMALL
 from tests.export.microcontroller.machine import COMMON, HERE
@@ -432,3 +436,19 @@ def test_the_command_writes_a_recorder_whose_skin_file_can_be_read(tmp_path, cap
     assert recorder.buses[0].serial
     assert main([]) == 2
     assert "give --data REC" in capsys.readouterr().err
+
+
+def test_beside_a_model_the_lower_threshold_holds_and_one_scale_of_counts(tmp_path):
+    model = Model(demo.MODEL)
+    layout = model.info.layout
+    skin = str(skinfile.shipped("cody"))
+    options = Namespace(c=tmp_path, skin=skin, c_error=None, flash=None)
+    model.info = replace(model.info, layout=replace(layout, threshold_counts=17))
+    write_c(options, model)
+    assert "#define EC_TOUCH_COUNTS 17\n" in (tmp_path / "skin_data.h").read_text()
+    sources = {*tmp_path.glob("*.c"), HERE / "skin_host.c"} - {tmp_path / "main.c"}
+    words = ["-shared", "-fPIC", "-I", tmp_path, *sources, "-lm"]
+    subprocess.run(["gcc", *COMMON, *words, "-o", tmp_path / "all.so"], check=True)
+    model.info = replace(model.info, layout=replace(layout, counts_per_newton=500.0))
+    with pytest.raises(InputError, match="cody.toml: counts_per_newton differs"):
+        write_c(options, model)
