@@ -20,7 +20,7 @@ from edge.chips.kinds import KINDS
 from edge.commands import calibrate
 from edge.errors import InputError
 from edge.skin import bus_reader, decoder, lone
-from edge.skin.file import SkinFile
+from edge.skin.file import Signal, SkinFile
 from edge.writing import write_whole
 from export.c_code import ROOMS, array, literal, write_rooms
 
@@ -92,15 +92,6 @@ def _numbers(file: SkinFile, hz: int) -> dict[str, Any]:
     rate_hz = file.reading.rate_hz
     period = round(hz / rate_hz)
     scale = 1 << decoder.SCALE_BITS
-    at_least = {
-        "longest_rest": retrying.LONGEST_REST_S,
-        "held": decoder.HELD_S,
-        "silent": lone.SILENT_S,
-        "alone": lone.ALONE_S,
-        "alone_at_start": lone.ALONE_AT_START_S,
-        "settle": signal.settle_s,
-    }
-    at_most = {"longest_step": bus_reader.LONGEST_STEP_S, "lone_start": lone.START_S}
     answers = [len(step.answer) for chip in file.chips for step in steps(chip.script)]
     numbers = {
         name: getattr(module, name)
@@ -110,33 +101,50 @@ def _numbers(file: SkinFile, hz: int) -> dict[str, Any]:
     kinds = {chip.kind.name for chip in file.chips}
     numbers |= {f"has_{name}": name in kinds for name in KINDS}
     numbers |= {name: getattr(file.layout, key) for key, name in SIZES.items()}
-    numbers |= {name: math.ceil(seconds * hz) for name, seconds in at_least.items()}
-    numbers |= {name: math.floor(seconds * hz) for name, seconds in at_most.items()}
-    return numbers | {
-        "hz": hz,
-        "period": period,
-        "oldest": bus_reader.OLDEST_FRAMES * period,
-        "skin_threshold": file.layout.threshold_counts,
-        "skin_onset": file.layout.onset,
-        "buses": len(file.buses),
-        "chips": len(file.chips),
-        "bytes": sum(chip.traits.frame_bytes for chip in file.chips),
-        "most_answer": max(answers),
-        "verify_mux": file.reading.verify_mux,
-        "recheck_frames": file.reading.recheck_frames,
-        "stuck_frames": file.reading.stuck_frames,
-        "frames_of_conversion": 1 + math.ceil(decoder.CONVERSION_S * rate_hz),
-        "chance": math.exp(decoder.LOG_CHANCE),
-        "repeats_of_1": 0.5 / math.sqrt(math.pi),
-        "standing_out": int(calibrate.SPREADS),
-        "ad7147_identity": ad7147.IDENTITY,
-        "mpr121_saturated": mpr121.SATURATED,
-        "dead_band_sigma": signal.dead_band_sigma,
-        "dead_band_counts": max(1, signal.dead_band_counts),
-        "drift_limit": signal.drift_limit_counts,
-        "drift_step": math.ceil(signal.drift_counts_per_s / rate_hz * scale),
-        "reach": signal.saturation_counts + signal.drift_limit_counts,
+    return (
+        numbers
+        | _times(signal, hz)
+        | {
+            "hz": hz,
+            "period": period,
+            "oldest": bus_reader.OLDEST_FRAMES * period,
+            "skin_threshold": file.layout.threshold_counts,
+            "skin_onset": file.layout.onset,
+            "buses": len(file.buses),
+            "chips": len(file.chips),
+            "bytes": sum(chip.traits.frame_bytes for chip in file.chips),
+            "most_answer": max(answers),
+            "verify_mux": file.reading.verify_mux,
+            "recheck_frames": file.reading.recheck_frames,
+            "stuck_frames": file.reading.stuck_frames,
+            "frames_of_conversion": 1 + math.ceil(decoder.CONVERSION_S * rate_hz),
+            "chance": math.exp(decoder.LOG_CHANCE),
+            "repeats_of_1": 0.5 / math.sqrt(math.pi),
+            "standing_out": int(calibrate.SPREADS),
+            "ad7147_identity": ad7147.IDENTITY,
+            "mpr121_saturated": mpr121.SATURATED,
+            "dead_band_sigma": signal.dead_band_sigma,
+            "dead_band_counts": max(1, signal.dead_band_counts),
+            "drift_limit": signal.drift_limit_counts,
+            "drift_step": math.ceil(signal.drift_counts_per_s / rate_hz * scale),
+            "reach": signal.saturation_counts + signal.drift_limit_counts,
+        }
+    )
+
+
+def _times(signal: Signal, hz: int) -> dict[str, int]:
+    """Times in ticks: ages reach some, and others are not exceeded."""
+    at_least = {
+        "longest_rest": retrying.LONGEST_REST_S,
+        "held": decoder.HELD_S,
+        "silent": lone.SILENT_S,
+        "alone": lone.ALONE_S,
+        "alone_at_start": lone.ALONE_AT_START_S,
+        "settle": signal.settle_s,
     }
+    at_most = {"longest_step": bus_reader.LONGEST_STEP_S, "lone_start": lone.START_S}
+    ticks = {name: math.ceil(seconds * hz) for name, seconds in at_least.items()}
+    return ticks | {name: math.floor(s * hz) for name, s in at_most.items()}
 
 
 def steps(script: Script) -> list[Step]:
