@@ -1,4 +1,4 @@
-// Reads a skin on the I2C pins of an RP2040, ESP32 or nRF52 board and prints what touches it, as the
+// Reads a skin on the I2C pins of an RP2040 or ESP32 board and prints what touches it, as the
 // JSON lines of `edge-classify run`; without a model, or with RECORD, it serves frames for
 // `edge-classify record`. Put the files of `edge-classify export --c DIR --skin skin.toml` beside this
 // sketch (not their main.c).
