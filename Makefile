@@ -93,7 +93,7 @@ test-all: lint types
 	$(PYTEST) $(TESTS)
 
 test-busy: $(DEV)
-	$(BIN)/python -m tests.busy $(PYTEST) -m "not slow" $(TESTS)
+	$(BIN)/python -m tests.checks.busy $(PYTEST) -m "not slow" $(TESTS)
 
 # The recordings to fit: DATA, or the simulated default set.
 SCENE := train/scenes/cody18.toml
@@ -163,12 +163,12 @@ golden: $(DEV)
 # The README's pictures.
 docs/tradeoff.png: tradeoff
 	cp $(OUT)/tradeoff/tradeoff.png $@
-	$(BIN)/python -m tests.bench.tables tradeoff "make tradeoff" $(OUT)/tradeoff/answer_*.csv
+	$(BIN)/python -m tests.checks.bench.tables tradeoff "make tradeoff" $(OUT)/tradeoff/answer_*.csv
 
 # The tables of docs/measured.md that a report has measured.
 docs/measured/study.md: STUDY := --seeds 8
 docs/measured/study.md: study
-	$(BIN)/python -m tests.bench.tables study 'make study STUDY="$(STUDY)"' $(OUT)/study/headline.csv
+	$(BIN)/python -m tests.checks.bench.tables study 'make study STUDY="$(STUDY)"' $(OUT)/study/headline.csv
 
 docs/touches.png docs/touches-dark.png: $(READY)
 	$(BIN)/python -m train show edge/demo/*.npz --model edge/demo/model.onnx \
@@ -186,7 +186,7 @@ $(BENCHVENV): $(DEV)
 
 # BENCH="-k region": only the benchmarks whose names contain this.
 bench: $(BENCHVENV)
-	$(BIN)/python -m pytest tests/bench -o python_files='bench_*.py' -o python_functions='bench_*' \
+	$(BIN)/python -m pytest tests/checks/bench -o python_files='bench_*.py' -o python_functions='bench_*' \
 	  -o filterwarnings=default $(BENCH)
 
 HELD := $(OUT)/transfer
@@ -195,7 +195,7 @@ transfer: SCENE := train/scenes/household.toml
 transfer: $(BENCHVENV)
 	$(BIN)/python -m train simulate $(SCENE) --out $(HELD)/simulated
 	$(BIN)/python -m export --data $(HELD)/simulated --out $(HELD)/household $(EXPORT)
-	$(BIN)/python -m tests.bench.transfer --model $(HELD)/household/model.onnx $(TRANSFER)
+	$(BIN)/python -m tests.checks.bench.transfer --model $(HELD)/household/model.onnx $(TRANSFER)
 
 ifndef DATA
 study tradeoff: $(SIMULATED)/.made
@@ -227,14 +227,14 @@ docs: $(VENV)/.docs
 	$(BIN)/python -m mkdocs build --quiet --strict --site-dir $(OUT)/site
 
 risk: $(DEV)
-	$(BIN)/python -m tests.bench.risk $(RISK)
+	$(BIN)/python -m tests.checks.bench.risk $(RISK)
 
 shifts: $(DEV) $(SIMULATED)/.made
 	$(BIN)/python -m export --data $(SIMULATED) --out $(OUT)/shifts $(EXPORT)
-	$(BIN)/python -m tests.bench.shifts --model $(OUT)/shifts/model.onnx
+	$(BIN)/python -m tests.checks.bench.shifts --model $(OUT)/shifts/model.onnx
 
 flags: $(BENCHVENV)
-	$(BIN)/python -m tests.bench.flags $(FLAGS)
+	$(BIN)/python -m tests.checks.bench.flags $(FLAGS)
 
 # Each folder of DATA is a data set of its own; by default five seeds of the scene, with 140
 # trials each and with 560: STOPPING_TRIALS of each object in each condition.
@@ -263,24 +263,24 @@ $(PEERS)/.ready: pyproject.toml constraints.txt
 	@touch $@
 
 accuracy: $(PEERS)/.ready
-	$(PEERS)/bin/python -m tests.bench.accuracy $(if $(GRASPS),--grasps "$(GRASPS)")
+	$(PEERS)/bin/python -m tests.checks.bench.accuracy $(if $(GRASPS),--grasps "$(GRASPS)")
 
 peers-test: $(PEERS)/.ready
 	$(PEERS)/bin/python -m pytest tests/edge/touch/test_kernels.py -k aeon -rs
 
 stopping: $(DEV)
-	$(BIN)/python -m tests.bench.stopping --data $(STOPPED) $(STOPPING)
+	$(BIN)/python -m tests.checks.bench.stopping --data $(STOPPED) $(STOPPING)
 
 # REMOUNT="icub sdh2": folders of imported grasps.
 remount: $(DEV)
-	$(BIN)/python -m tests.remount --recordings $(REMOUNT)
+	$(BIN)/python -m tests.checks.remount --recordings $(REMOUNT)
 
 # FAULTS="--every 10": every tenth position.
 faults: $(DEV)
-	$(BIN)/python -m tests.faults $(FAULTS)
+	$(BIN)/python -m tests.checks.faults $(FAULTS)
 
 soak: $(DEV)
-	$(BIN)/python -m tests.bench.soak $(SOAK)
+	$(BIN)/python -m tests.checks.bench.soak $(SOAK)
 
 # Every table of docs/measured, one target after another, with a line for each as it ends. The
 # tables that this writes are no local change.
@@ -325,7 +325,7 @@ $(VENV)/.browser: $(DEV)
 	$(PIP) --group browser
 	@touch $@
 
-BROWSED := tests/edge/tools/test_page_in_a_browser.py tests/train/tradeoff/test_slider.py \
+BROWSED := tests/edge/app/sinks/test_page_in_a_browser.py tests/train/tradeoff/test_slider.py \
   tests/train/report/test_page.py tests/train/study/test_study_report.py tests/test_site.py
 
 browser-test: $(VENV)/.browser $(VENV)/.docs
@@ -351,7 +351,7 @@ HARD := $(OUT)/hard-cases
 
 # Includes the answers of another ONNX Runtime.
 hard-cases: hard-cases-versions
-	$(BIN)/python -m tests.hard_cases
+	$(BIN)/python -m tests.checks.hard_cases
 
 # Writes golden files of the hard cases, then checks them with other ONNX Runtimes.
 OTHER_RUNTIMES ?= 1.22.1 1.26.0 1.32.0
@@ -365,9 +365,9 @@ $(OTHERS:%=%/.ready): $(HARD)/onnxruntime-%/.ready: constraints.txt
 	@touch $@
 
 hard-cases-versions: $(DEV) $(OTHERS:%=%/.ready)
-	$(BIN)/python -m tests.hard_cases.golden --out $(HARD)/golden
+	$(BIN)/python -m tests.checks.hard_cases.golden --out $(HARD)/golden
 	for other in $(OTHERS); do \
-	  $(BIN)/python -m tests.hard_cases.elsewhere --golden $(HARD)/golden $$other/bin/python \
+	  $(BIN)/python -m tests.checks.hard_cases.elsewhere --golden $(HARD)/golden $$other/bin/python \
 	  || exit 1; done
 
 $(VENV)/.mutants: $(DEV)
@@ -377,7 +377,7 @@ $(VENV)/.mutants: $(DEV)
 # MUTANTS="--only edge.touch --count 50 --minutes 5": a smaller draw. mutmut forks, and worker
 # processes that were started before a fork answer nobody.
 mutants: $(VENV)/.mutants
-	LOKY_MAX_CPU_COUNT=1 $(BIN)/python -m tests.mutants $(MUTANTS)
+	LOKY_MAX_CPU_COUNT=1 $(BIN)/python -m tests.checks.mutants $(MUTANTS)
 
 # The lines that differ are missing pins (<) and pins that nothing needs (>).
 GROUPS := train dev docs browser mutants bench upkeep
@@ -389,11 +389,11 @@ constraints: $(VENV)/.upkeep
 
 # FUZZ="-k scene": only the readers whose names contain this.
 fuzz: $(DEV)
-	FUZZ_FILES=5000 $(BIN)/python -m pytest tests/fuzz -n 2 -v $(FUZZ)
+	FUZZ_FILES=5000 $(BIN)/python -m pytest tests/checks/fuzz -n 2 -v $(FUZZ)
 
 # KILLS="--count 10 --only install": fewer of them.
 kills: $(DEV)
-	$(BIN)/python -m tests.kills $(KILLS)
+	$(BIN)/python -m tests.checks.kills $(KILLS)
 
 clean:
 	rm -rf build dist mutants

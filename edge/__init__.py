@@ -11,33 +11,33 @@ TYPE_CHECKING = (
     False  # type checkers read it as true; to load typing would take longer than edge
 )
 if TYPE_CHECKING:
-    from edge.classifier import Classifier as Classifier
+    from edge.decide.classifier import Classifier as Classifier
+    from edge.decide.events import Decided as Decided
+    from edge.decide.events import Onset as Onset
+    from edge.decide.events import Release as Release
+    from edge.decide.model import Decision as Decision
+    from edge.decide.model import Model as Model
     from edge.errors import EdgeError as EdgeError
     from edge.errors import InputError as InputError
-    from edge.events import Decided as Decided
-    from edge.events import Onset as Onset
-    from edge.events import Release as Release
-    from edge.model.model import Decision as Decision
-    from edge.model.model import Model as Model
-    from edge.recording import Recording as Recording
-    from edge.recording import load as load
-    from edge.saving import save as save
-    from edge.skin.skin import Skin as Skin
+    from edge.record.recording import Recording as Recording
+    from edge.record.recording import load as load
+    from edge.record.saving import save as save
     from edge.touch.arm import Chain as Chain
     from edge.touch.features import feature_vector as feature_vector
     from edge.touch.region import find_regions as find_regions
     from edge.touch.region import largest_region as largest_region
+    from edge.wire.skin.skin import Skin as Skin
 
 __version__ = "0.2.0"
 
 _PUBLIC = {
-    "edge.classifier": ["Classifier"],
+    "edge.decide.classifier": ["Classifier"],
     "edge.errors": ["EdgeError", "InputError"],
-    "edge.events": ["Decided", "Onset", "Release"],
-    "edge.model.model": ["Decision", "Model"],
-    "edge.recording": ["Recording", "load"],
-    "edge.saving": ["save"],
-    "edge.skin.skin": ["Skin"],
+    "edge.decide.events": ["Decided", "Onset", "Release"],
+    "edge.decide.model": ["Decision", "Model"],
+    "edge.record.recording": ["Recording", "load"],
+    "edge.record.saving": ["save"],
+    "edge.wire.skin.skin": ["Skin"],
     "edge.touch.arm": ["Chain"],
     "edge.touch.features": ["feature_vector"],
     "edge.touch.region": ["find_regions", "largest_region"],

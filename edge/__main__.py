@@ -21,7 +21,7 @@ def start(module: str, argv: Sequence[str] | None = None) -> int:
 
 def main() -> int:
     """Run the command line; returns the exit status."""
-    return start("edge.cli")
+    return start("edge.app.cli")
 
 
 if __name__ == "__main__":

@@ -14,8 +14,8 @@ from typing import Any
 import numpy as np
 
 from edge import __version__
-from edge.model.info import ModelInfo, Task
-from edge.model.model import Model
+from edge.decide.info import ModelInfo, Task
+from edge.decide.model import Model
 from edge.touch.track import DEBOUNCE
 from edge.writing import write_whole
 from export import golden

@@ -15,11 +15,11 @@ from pathlib import Path
 import numpy as np
 
 from edge.arrays import Array, Floats
-from edge.early import stopping_rules
+from edge.decide.early import stopping_rules
+from edge.decide.info import ModelInfo, Novelty, Remoteness, StoppingRule
+from edge.decide.model import Model
 from edge.elementary import log, logistic, sin
 from edge.errors import InputError
-from edge.model.info import ModelInfo, Novelty, Remoteness, StoppingRule
-from edge.model.model import Model
 from edge.touch import measures, transforms
 from edge.touch.cells import KERNEL_CELLS, Cells
 from edge.touch.contact import feature_types

@@ -10,10 +10,10 @@ from typing import NamedTuple
 import numpy as np
 
 from edge.arrays import Array, Floats, Integers
+from edge.decide.graph import Graph
+from edge.decide.model import Model
+from edge.decide.onnx_file import Node
 from edge.errors import InputError
-from edge.model.graph import Graph
-from edge.model.model import Model
-from edge.model.onnx_file import Node
 from export.build import smallest
 
 NOWHERE = 65535

@@ -14,21 +14,21 @@ from typing import Any
 import numpy as np
 from joblib import cpu_count
 
-from edge.classifier import suited
-from edge.cli import dispatch
-from edge.commands.options import within
+from edge.app.cli import dispatch
+from edge.app.commands.replay import Summary, compared, decide
+from edge.app.options import within
+from edge.app.trial_options import add_arm, open_arm
+from edge.decide.classifier import suited
+from edge.decide.model import Model
 from edge.errors import InputError
-from edge.labels import read_table
-from edge.model.model import Model
-from edge.recording import load
-from edge.saving import find, listed
-from edge.skin import file as skinfile
-from edge.tools.replay import Summary, compared, decide
-from edge.tools.slips import counts_text
-from edge.tools.trial_options import add_arm, open_arm
+from edge.record.labels import read_table
+from edge.record.recording import load
+from edge.record.saving import find, listed
+from edge.record.slips import counts_text
 from edge.touch import measures
 from edge.touch.features import WINDOW_S
 from edge.touch.layout import for_device
+from edge.wire.skin import file as skinfile
 from edge.writing import check_writable
 from export.api import measure, save
 from train.choose.choose import SECOND_WORTH

@@ -1,4 +1,4 @@
-"""golden.npz: see `edge.model.verify` for the format."""
+"""golden.npz: see `edge.decide.verify` for the format."""
 
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
@@ -9,10 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from edge.arrays import Floats
-from edge.model.model import Model
-from edge.model.verify import answers, first_series, integers_of
-from edge.recording import Recording
-from edge.saving import save_arrays
+from edge.decide.model import Model
+from edge.decide.verify import answers, first_series, integers_of
+from edge.record.recording import Recording
+from edge.record.saving import save_arrays
 from edge.touch.contact import FeatureSeries
 from train.data.dataset import DataSet
 from train.data.folds import finest

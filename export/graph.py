@@ -21,9 +21,9 @@ from skl2onnx import convert_sklearn, update_registered_converter
 from skl2onnx.common.data_types import DoubleTensorType, Int64TensorType
 
 from edge.arrays import Booleans, Floats, Integers
-from edge.model.info import METADATA_KEY, ModelInfo
-from edge.model.metadata import to_json
-from edge.model.onnx_file import DIGEST, OPSET
+from edge.decide.info import METADATA_KEY, ModelInfo
+from edge.decide.metadata import to_json
+from edge.decide.onnx_file import DIGEST, OPSET
 from export.build import Builder, project, widened
 from train.model.novelty import (
     CLIP,
@@ -360,7 +360,7 @@ def to_onnx(model: Fitted, info: ModelInfo) -> bytes:
 
     A `SequentialClassifier` gives a second input, `decision_point` int64 (1,), whose
     default is the last one, and for each task the output `<task>_label_distances` (n,
-    labels); see `edge.model.info`.
+    labels); see `edge.decide.info`.
     """
     kind = type(model)
     update_registered_converter(

@@ -13,14 +13,14 @@ from typing import Any
 
 import numpy as np
 
-from edge.bus import protocol, retrying
-from edge.chips import ad7147, mpr121
-from edge.chips.chip import MOST_TAXELS, ChipSpec, Script, Step
-from edge.chips.kinds import KINDS
-from edge.commands import calibrate
+from edge.app.commands import calibrate
 from edge.errors import InputError
-from edge.skin import bus_reader, decoder, lone
-from edge.skin.file import Signal, SkinFile
+from edge.wire.bus import protocol, retrying
+from edge.wire.chips import ad7147, mpr121
+from edge.wire.chips.chip import MOST_TAXELS, ChipSpec, Script, Step
+from edge.wire.chips.kinds import KINDS
+from edge.wire.skin import bus_reader, decoder, lone
+from edge.wire.skin.file import Signal, SkinFile
 from edge.writing import write_whole
 from export.c_code import ROOMS, array, literal, write_rooms
 

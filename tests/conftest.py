@@ -19,10 +19,10 @@ from hypothesis import settings
 from joblib.externals.loky import get_reusable_executor
 
 import train
-from edge.cli import main as edge_classify
-from edge.model.onnx_file import DIGEST
-from edge.recording import Recording
-from edge.saving import save
+from edge.app.cli import main as edge_classify
+from edge.decide.onnx_file import DIGEST
+from edge.record.recording import Recording
+from edge.record.saving import save
 from edge.touch.layout import SkinLayout
 from export.__main__ import main as export_main
 from export.graph import with_digest

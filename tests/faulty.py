@@ -8,12 +8,12 @@ from dataclasses import dataclass, replace
 from functools import partial
 from typing import NamedTuple
 
-from edge.bus.protocol import Transfer, bus_error, write
-from edge.fake.bus import NACK_BITS, FakeBus, FakeTCA9548A
-from edge.fake.clock import VirtualClock
-from edge.fake.player import calibrated, fake_buses
-from edge.skin.skin import Skin
-from edge.skin.wiring import BusSpec
+from edge.wire.bus.protocol import Transfer, bus_error, write
+from edge.wire.fake.bus import NACK_BITS, FakeBus, FakeTCA9548A
+from edge.wire.fake.clock import VirtualClock
+from edge.wire.fake.player import calibrated, fake_buses
+from edge.wire.skin.skin import Skin
+from edge.wire.skin.wiring import BusSpec
 
 
 class Route(NamedTuple):

@@ -9,14 +9,14 @@ import sys
 from pathlib import Path
 
 from edge import demo
-from edge.skin import file as skinfile
+from edge.wire.skin import file as skinfile
 
 ROOT = Path(__file__).parents[1]
 ROOMS = "edge commands bus chips skin touch model output tools fake".split()
 """In the order of the list; modules of `edge` itself come first."""
 PROGRAM = """
 import sys
-from edge import cli
+from edge.app import cli
 try:
     cli.main(sys.argv[1:])
 finally:

@@ -1,8 +1,8 @@
 """A model that decides at several points of time, fitted on vectors of a test."""
 
-from edge.model.model import Model
+from edge.decide.model import Model
 from export.graph import to_onnx
-from tests.hard_cases.models import describe
+from tests.checks.hard_cases.models import describe
 from train.data.folds import stratified_folds
 from train.model.stopping import SequentialClassifier
 

@@ -2,9 +2,9 @@
 
 import random
 
-from edge.bus.serial_bus import SerialBus, decode, encode
-from edge.chips.block import IDENTITY
-from edge.fake.bus import FakeBus
+from edge.wire.bus.serial_bus import SerialBus, decode, encode
+from edge.wire.chips.block import IDENTITY
+from edge.wire.fake.bus import FakeBus
 
 ANSWERS_AFTER_S = 0.0015
 """From the request to the first 64 bytes."""

@@ -1,6 +1,6 @@
 """CONTRIBUTING.md: its table is true, and a toy of each kind is added as it says.
 
-`tests/edge/chips/test_kinds.py` adds a chip, `tests/train/simulate/test_effects.py` an
+`tests/edge/wire/chips/test_kinds.py` adds a chip, `tests/train/simulate/test_effects.py` an
 effect.
 """
 
@@ -8,15 +8,15 @@ import json
 import re
 import sys
 
+import edge.tools
 import numpy as np
 import pytest
 from pandas import DataFrame
 
-import edge.tools
 import train
 import train.importers
-from edge import cli
-from edge.recording import load
+from edge.app import cli
+from edge.record.recording import load
 from tests.conftest import ROOT
 from train.__main__ import main
 from train.data.feature_sets import SETS
@@ -66,7 +66,7 @@ def module(package, monkeypatch, folder, text):
 
 IMPORTER = '''"""Pictures of a toy, one trial a line."""
 import numpy as np
-from edge.recording import Recording
+from edge.record.recording import Recording
 
 def add_options(parser):
     parser.add_argument("--times", type=int, default=1)
@@ -124,7 +124,7 @@ COMMAND = '''"""Say a word.
 
 Says it once.
 """
-from edge.commands.output import Output
+from edge.app.output import Output
 
 def add_options(parser):
     parser.add_argument("word")

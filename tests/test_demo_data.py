@@ -4,9 +4,9 @@ from dataclasses import replace
 from pathlib import Path
 
 from edge import demo
-from edge.model.model import Model
-from edge.recording import load
-from edge.saving import save
+from edge.decide.model import Model
+from edge.record.recording import load
+from edge.record.saving import save
 
 GOLDEN = Path(__file__).parent / "golden" / "demo.npz"
 

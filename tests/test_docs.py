@@ -11,11 +11,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from edge import cli
-from edge.chips import block
-from edge.chips.chip import MOST_TAXELS
-from edge.flags import FLAGS
-from edge.model.info import FORMAT
+from edge.app import cli
+from edge.decide.flags import FLAGS
+from edge.decide.info import FORMAT
+from edge.wire.chips import block
+from edge.wire.chips.chip import MOST_TAXELS
 from export.__main__ import main as export
 from tests.conftest import ROOT, ended
 

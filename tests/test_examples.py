@@ -16,9 +16,9 @@ import pytest
 
 import edge
 from edge import demo
-from edge.fake.player import play, skin_file
+from edge.wire.fake.player import play, skin_file
 from tests.conftest import ROOT, python, save_touches
-from tests.edge.test_recording import sheared
+from tests.edge.record.test_recording import sheared
 from train.__main__ import main as train_main
 
 EXAMPLES = ROOT / "docs" / "examples"

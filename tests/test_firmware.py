@@ -11,14 +11,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from edge.bus.crc import crc16
-from edge.bus.serial_bus import SerialBus
-from edge.chips.block import Block
-from edge.chips.chip import ChipSpec
-from edge.chips.three_axes import ZERO, ThreeAxisBlock, axes
-from edge.fake.bus import FakeBus
-from edge.skin import file as skinfile
-from edge.skin.skin import Skin
+from edge.wire.bus.crc import crc16
+from edge.wire.bus.serial_bus import SerialBus
+from edge.wire.chips.block import Block
+from edge.wire.chips.chip import ChipSpec
+from edge.wire.chips.three_axes import ZERO, ThreeAxisBlock, axes
+from edge.wire.fake.bus import FakeBus
+from edge.wire.skin import file as skinfile
+from edge.wire.skin.skin import Skin
 from tests.conftest import ROOT, ended
 
 MATRIX = ROOT / "docs" / "examples" / "firmware" / "matrix"

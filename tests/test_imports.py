@@ -10,7 +10,7 @@ import pytest
 from tests.conftest import ROOT, python
 
 BOARD = {"numpy", "onnxruntime", "smbus2", "edge"}
-OPTIONAL = {"serial": "edge/bus/serial_bus.py", "argcomplete": "edge/cli.py"}
+OPTIONAL = {"serial": "edge/wire/bus/serial_bus.py", "argcomplete": "edge/app/cli.py"}
 """The packages of the wheel's extras, and the only module that may import each."""
 FORBIDDEN = {"pickle", "joblib.dump", "marshal", "shelve"}
 
@@ -105,7 +105,7 @@ def test_a_stage_imports_only_earlier_ones(stage, later):
     ("program", "left_out"),
     [
         ("import edge", ("edge.", "numpy")),
-        ("import edge.cli, edge.classifier", ("onnxruntime",)),
+        ("import edge.app.cli, edge.decide.classifier", ("onnxruntime",)),
         (
             "from edge import cli; cli.parser(['check'])",
             ("edge.commands.r", "edge.tools"),
@@ -135,5 +135,8 @@ def test_no_modules_import_each_other_in_a_circle():
             for alias in node.names
         }
         graph[name] = (imported(path) | named) & paths.keys()
-    assert graph["edge.skin.file"] >= {"edge.chips.chip", "edge.skin.wiring"}
+    assert graph["edge.wire.skin.file"] >= {
+        "edge.wire.chips.chip",
+        "edge.wire.skin.wiring",
+    }
     assert len(list(TopologicalSorter(graph).static_order())) == len(graph)

@@ -5,9 +5,9 @@ import re
 import pytest
 
 from edge.touch.features import WINDOW_S
-from tests.bench import tables
+from tests.checks.bench import tables
+from tests.checks.hard_cases.registry import CASES
 from tests.conftest import ROOT
-from tests.hard_cases.registry import CASES
 from train.choose.decision_points import STEPS_S
 from train.model.rules import RISK, TEST_SHARE, upper_limit
 

@@ -4,12 +4,12 @@ a table names the command that made it."""
 import pytest
 
 from edge.errors import EdgeError
-from tests import mutants
-from tests.bench import tables
-from tests.bench.program import start
-from tests.hard_cases import __main__ as hard_cases
-from tests.hard_cases import elsewhere
-from tests.other_skins import SKINS, touch
+from tests.checks import mutants
+from tests.checks.bench import tables
+from tests.checks.bench.program import start
+from tests.checks.hard_cases import __main__ as hard_cases
+from tests.checks.hard_cases import elsewhere
+from tests.checks.other_skins import SKINS, touch
 
 
 @pytest.mark.parametrize(
@@ -49,7 +49,9 @@ def test_a_table_has_its_command_as_it_can_be_run_and_no_empty_part(
     monkeypatch.setattr("sys.argv", [str(program), "--data", "two words"])
     tables.write("soak", [[], [{"a": 1, "b": "x"}, {"a": 2, "b": "y"}], []])
     head, *lines = (tmp_path / "soak.md").read_text().splitlines()
-    assert head.startswith("*`python -m tests.bench.soak --data 'two words'`, commit ")
+    assert head.startswith(
+        "*`python -m tests.checks.bench.soak --data 'two words'`, commit "
+    )
     assert lines == ["", "| a | b |", "| --- | --- |", "| 1 | x |", "| 2 | y |"]
 
 

@@ -3,23 +3,23 @@
 import pytest
 
 from edge import demo
-from edge.skin import file as skinfile
+from edge.wire.skin import file as skinfile
 from tests import reading_list
 from tests.conftest import ROOT
-from tests.edge.bus.shim import build as shim
+from tests.edge.wire.bus.shim import build as shim
 
 OPTIONAL = (
-    "edge/bus/serial_bus.py",
-    "edge/chips/block.py",
-    "edge/chips/mpr121.py",
-    "edge/commands/texts.py",
-    "edge/counts.py",
-    "edge/early.py",
-    "edge/model/agreement.py",
-    "edge/model/graph.py",
-    "edge/no_contact.py",
-    "edge/output/systemd.py",
-    "edge/recording.py",
+    "edge/wire/bus/serial_bus.py",
+    "edge/wire/chips/block.py",
+    "edge/wire/chips/mpr121.py",
+    "edge/app/texts.py",
+    "edge/record/counts.py",
+    "edge/decide/early.py",
+    "edge/decide/agreement.py",
+    "edge/decide/graph.py",
+    "edge/decide/no_contact.py",
+    "edge/app/sinks/systemd.py",
+    "edge/record/recording.py",
     "edge/touch/joint_stream.py",
     "edge/touch/kernels.py",
     "edge/touch/urdf.py",
@@ -50,13 +50,19 @@ def core(tmp_path_factory):
 
 
 def test_a_run_reads_the_skin_and_decides_with_a_model(core):
-    modules = ("edge/bus/linux.py", "edge/chips/ad7147.py", "edge/model/engines.py")
+    modules = (
+        "edge/wire/bus/linux.py",
+        "edge/wire/chips/ad7147.py",
+        "edge/decide/engines.py",
+    )
     assert set(modules) <= set(core)
 
 
 def test_the_core_loads_neither_tools_nor_fakes(core):
     assert core
-    beside = [path for path in core if path.startswith(("edge/fake/", "edge/tools/"))]
+    beside = [
+        path for path in core if path.startswith(("edge/wire/fake/", "edge/tools/"))
+    ]
     assert beside == []
 
 
@@ -68,4 +74,4 @@ def test_what_nothing_calls_for_is_not_loaded(core, path):
 
 def test_the_list_names_a_module_a_line(capsys):
     reading_list.main()
-    assert "edge/skin/bus_reader.py" in capsys.readouterr().out.splitlines()
+    assert "edge/wire/skin/bus_reader.py" in capsys.readouterr().out.splitlines()

@@ -6,9 +6,9 @@ import shlex
 
 import pytest
 
-from edge import cli
-from edge.bus import protocol
-from edge.tools import workstation
+from edge.app import cli
+from edge.app.commands import workstation
+from edge.wire.bus import protocol
 from export.cli import parser as export_parser
 from tests.conftest import ROOT, ended
 from train.__main__ import parser as train_parser

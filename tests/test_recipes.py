@@ -8,7 +8,7 @@ import sys
 import numpy as np
 import pytest
 
-from edge.recording import load
+from edge.record.recording import load
 from tests.conftest import ROOT
 from tests.train.importers.ros import FRAMES, sensor, write_mcap
 

@@ -4,7 +4,7 @@ import argparse
 import sys
 from collections.abc import Iterable, Sequence
 
-from edge.cli import add_commands, dispatch
+from edge.app.cli import add_commands, dispatch
 
 COMMANDS = {
     "import": "train.commands.import_",
@@ -14,7 +14,7 @@ COMMANDS = {
     "show": "train.commands.show",
     "thresholds": "train.commands.thresholds",
 }
-"""Modules by command; see `edge.cli.add_commands`."""
+"""Modules by command; see `edge.app.cli.add_commands`."""
 
 
 def parser(names: Iterable[str] = COMMANDS) -> argparse.ArgumentParser:

@@ -10,7 +10,7 @@ import numpy as np
 
 from edge.arrays import Floats
 from edge.errors import InputError
-from edge.tools.slips import slips, too_few
+from edge.record.slips import slips, too_few
 from edge.touch.features import WINDOW_S
 from train.choose.candidates import Candidate
 from train.choose.decision_points import decision_points, has_early_points

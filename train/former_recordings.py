@@ -4,8 +4,8 @@ it."""
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 
-from edge.labels import read_table
-from edge.saving import recordings_in
+from edge.record.labels import read_table
+from edge.record.saving import recordings_in
 
 
 def warnings(folder: Path, written: Iterable[Path]) -> Iterator[str]:

@@ -1,4 +1,4 @@
-/* From a contact to its events: edge/classifier.py, answers.py, early.py, model/model.py, info.py,
+/* From a contact to its events: edge/decide/classifier.py, answers.py, early.py, model/model.py, info.py,
    agreement.py. */
 #include "internal.h"
 

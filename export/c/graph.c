@@ -1,4 +1,4 @@
-/* The exported graph, as edge/model/graph.py computes it, for one vector, in slices. All that
+/* The exported graph, as edge/decide/graph.py computes it, for one vector, in slices. All that
    decides is made of whole numbers below 2^53, so that the order of sums changes no bit. */
 #include "internal.h"
 

@@ -280,7 +280,7 @@ extern const uint64_t ec_checksum; /* of the outputs for features that are all E
 #define EC_PROBE 0.3
 #define EC_PROBES 8
 
-/* graph.c: edge/model/graph.py */
+/* graph.c: edge/decide/graph.py */
 extern double ec_arena[EC_ARENA];
 void ec_graph_begin(void);
 bool ec_graph_slice(uint32_t point);

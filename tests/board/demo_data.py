@@ -13,10 +13,10 @@ from pathlib import Path
 
 import numpy as np
 
-from edge.model.model import Model
-from edge.model.verify import first_series
-from edge.recording import load
-from edge.saving import save_arrays
+from edge.decide.model import Model
+from edge.decide.verify import first_series
+from edge.record.recording import load
+from edge.record.saving import save_arrays
 from export import golden
 from train.data.dataset import Measurement, load_trials
 

@@ -1,6 +1,6 @@
 """Tests of commands and drivers on a real kernel's /dev/i2c-N, run in the guest.
 
-`test_kernel.py` runs them. The chips of `edge.fake` stand behind the kernel. A frame of
+`test_kernel.py` runs them. The chips of `edge.wire.fake` stand behind the kernel. A frame of
 a recording lasts until every chip has been read once, so that the slow guest sees every
 frame, as a fake bus in virtual time does.
 """
@@ -19,17 +19,17 @@ import numpy as np
 import pytest
 from smbus2 import SMBus
 
-from edge.bus.linux import LinuxBus
-from edge.bus.protocol import BusBusy, BusDenied, BusFault, BusNack, fetch
-from edge.cli import main
-from edge.fake.clock import VirtualClock
-from edge.fake.player import Playback, calibrated
-from edge.recording import Recording, load
-from edge.saving import save
-from edge.skin import file as skinfile
-from edge.skin.calibration import save_calibration
-from edge.skin.loop import Loop
-from edge.skin.skin import Skin
+from edge.app.cli import main
+from edge.record.recording import Recording, load
+from edge.record.saving import save
+from edge.wire.bus.linux import LinuxBus
+from edge.wire.bus.protocol import BusBusy, BusDenied, BusFault, BusNack, fetch
+from edge.wire.fake.clock import VirtualClock
+from edge.wire.fake.player import Playback, calibrated
+from edge.wire.skin import file as skinfile
+from edge.wire.skin.calibration import save_calibration
+from edge.wire.skin.loop import Loop
+from edge.wire.skin.skin import Skin
 from tests.board.usb_adapter import UsbAdapter, plugged
 from tests.faulty import Fault, faulty_buses
 

@@ -18,7 +18,7 @@ import sys
 import pytest
 
 from edge.demo import MODEL
-from edge.skin import file as skinfile
+from edge.wire.skin import file as skinfile
 from tests.board.debian import CHECKOUT, Unavailable, program, skipping, unpacked
 from tests.conftest import ended
 

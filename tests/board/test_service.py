@@ -15,9 +15,9 @@ import numpy
 import pytest
 
 from edge import demo
-from edge.fake.player import calibrated
-from edge.skin import file as skinfile
-from edge.skin.calibration import save_calibration
+from edge.wire.fake.player import calibrated
+from edge.wire.skin import file as skinfile
+from edge.wire.skin.calibration import save_calibration
 from tests.conftest import ended
 
 HERE = Path(__file__).resolve().parent

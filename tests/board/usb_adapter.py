@@ -15,7 +15,7 @@ import time
 from contextlib import contextmanager
 from pathlib import Path
 
-from edge.bus.protocol import BusError, BusNack, BusTimeout, read, write
+from edge.wire.bus.protocol import BusError, BusNack, BusTimeout, read, write
 
 DEVICE_DESCRIPTOR = bytes.fromhex(
     "12 01 1001 ff 00 00 08"  # USB 1.1, a class of the vendor's own, packets of 8 bytes

@@ -5,9 +5,9 @@ import signal
 
 import pytest
 
-from edge import recording, saving
-from edge.model.model import Model
-from edge.skin import file as skinfile
+from edge.decide.model import Model
+from edge.record import recording, saving
+from edge.wire.skin import file as skinfile
 from tests.conftest import in_a_row
 from tests.edge.touch.test_urdf import ARM
 

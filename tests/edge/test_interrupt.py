@@ -65,7 +65,7 @@ class Watch:
             print(name, file=sys.stderr)
 
 sys.meta_path.insert(0, Watch)
-start("edge.cli", ["run", "--model", str(demo.MODEL), "--fake", str(demo.recordings()[0])])
+start("edge.app.cli", ["run", "--model", str(demo.MODEL), "--fake", str(demo.recordings()[0])])
 """
 
 

@@ -6,10 +6,10 @@ from types import SimpleNamespace
 import pytest
 
 import edge
-from edge.commands import source
+from edge.app import source
 from edge.errors import InputError
 from tests.conftest import export, save_touches
-from tests.edge.test_classifier import decided
+from tests.edge.decide.test_classifier import decided
 
 EARLY_S = 0.1
 """From the event to the touch, which begins at 0.2 s."""
@@ -58,7 +58,7 @@ def test_several_contacts_cannot_have_one_event(of_events):
 def test_a_run_takes_the_event_of_the_recording_that_it_plays(
     of_events, make_touch, tmp_path, edge
 ):
-    from edge.saving import save
+    from edge.record.saving import save
 
     path = tmp_path / "touch.npz"
     save(path, with_onset(make_touch(seed=99)))

@@ -11,12 +11,12 @@ import numpy as np
 import pytest
 
 from edge import demo
-from edge.answers import answers_about
-from edge.classifier import ASKED_A_SECOND, FEWEST_ASKED, Classifier
-from edge.events import Decided, Onset
-from edge.model.model import Model
-from edge.recording import load
-from edge.saving import save
+from edge.decide.answers import answers_about
+from edge.decide.classifier import ASKED_A_SECOND, FEWEST_ASKED, Classifier
+from edge.decide.events import Decided, Onset
+from edge.decide.model import Model
+from edge.record.recording import load
+from edge.record.saving import save
 from edge.touch.arm import Chain
 from edge.touch.frame import Frame
 from edge.touch.layout import SkinLayout
@@ -90,7 +90,7 @@ def test_no_frame_asks_more_than_a_few_questions_and_the_answers_are_the_same(
     spread, questions = decided(early, error)
     assert sum(isinstance(event, Onset) for _, event in spread) == len(PLACES)
     assert max(questions) == FEWEST_ASKED
-    monkeypatch.setattr("edge.classifier.ASKED_A_SECOND", AT_ONCE)
+    monkeypatch.setattr("edge.decide.classifier.ASKED_A_SECOND", AT_ONCE)
     at_once, questions = decided(early, error)
     assert max(questions) == len(PLACES)
     assert len(answers_of(at_once)) == len(PLACES) * len(early.info.tasks)
@@ -108,9 +108,9 @@ def test_the_contact_that_has_been_due_longest_is_asked_first(early, monkeypatch
         asked.append((number, point))
         return answers_about(model, contact, number, point)
 
-    monkeypatch.setattr("edge.classifier.answers_about", answers)
-    monkeypatch.setattr("edge.classifier.FEWEST_ASKED", 1)
-    monkeypatch.setattr("edge.classifier.ASKED_A_SECOND", 0)
+    monkeypatch.setattr("edge.decide.classifier.answers_about", answers)
+    monkeypatch.setattr("edge.decide.classifier.FEWEST_ASKED", 1)
+    monkeypatch.setattr("edge.decide.classifier.ASKED_A_SECOND", 0)
     classifier = Classifier(early, error=ERROR, max_contacts=3)
     for policy in classifier._policies.values():
         monkeypatch.setattr(policy, "answer", lambda *_: None)
@@ -134,7 +134,7 @@ def test_a_slow_skin_asks_more_a_frame_so_that_no_answer_comes_late(early):
 def test_a_stream_that_ends_is_asked_about_all_that_is_due(early, monkeypatch):
     """Decision points that have come are not passed over for the full window."""
     spread, _ = decided(early, ERROR, stop=83)
-    monkeypatch.setattr("edge.classifier.ASKED_A_SECOND", AT_ONCE)
+    monkeypatch.setattr("edge.decide.classifier.ASKED_A_SECOND", AT_ONCE)
     at_once, _ = decided(early, ERROR, stop=83)
     assert answers_of(at_once)
     assert answers_of(spread) == answers_of(at_once)

@@ -7,12 +7,12 @@ import pytest
 
 import export
 import train
-from edge.classifier import Classifier
+from edge.decide.classifier import Classifier
+from edge.decide.model import Model
+from edge.decide.verify import verify
 from edge.errors import InputError
-from edge.model.model import Model
-from edge.model.verify import verify
-from edge.recording import load
-from edge.saving import save
+from edge.record.recording import load
+from edge.record.saving import save
 from export import api, c_code
 from train.report.summary import names, warnings
 

@@ -5,9 +5,9 @@ import onnx
 import pytest
 from onnx import TensorProto, helper
 
-from edge.model.onnx_file import OPSET
+from edge.decide.onnx_file import OPSET
 from export.build import Builder
-from tests.hard_cases.models import session
+from tests.checks.hard_cases.models import session
 
 
 @pytest.fixture

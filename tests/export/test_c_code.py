@@ -11,22 +11,22 @@ import numpy as np
 import pytest
 
 from edge import demo
-from edge.classifier import Classifier
+from edge.decide.classifier import Classifier
+from edge.decide.events import Decided
+from edge.decide.info import Novelty, margin
+from edge.decide.model import Model
 from edge.elementary import logistic
 from edge.errors import InputError
-from edge.events import Decided
-from edge.model.info import Novelty, margin
-from edge.model.model import Model
-from edge.recording import load
-from edge.saving import save
-from edge.skin import file as skinfile
+from edge.record.recording import load
+from edge.record.saving import save
 from edge.touch import measures
 from edge.touch.feature import KERNELS
 from edge.touch.kernels import KernelTable, channels_of
 from edge.touch.layout import SkinLayout
+from edge.wire.skin import file as skinfile
 from export import c_code, skin_code
 from tests.conftest import ROOT, ended, export, in_a_row, touch
-from tests.edge.model.test_engines import hostile
+from tests.edge.decide.test_engines import hostile
 from tests.export.microcontroller import machine
 from tests.export.microcontroller.comparison import (
     assert_same,

@@ -4,14 +4,14 @@ import numpy as np
 import pytest
 
 from edge import demo
-from edge.model.model import Model
+from edge.decide.model import Model
 from export.build import smallest
 from export.c_graph import TYPES, CompiledGraph
 from export.graph import to_onnx
-from tests.edge.model.test_engines import hostile
+from tests.checks.hard_cases.models import describe
+from tests.edge.decide.test_engines import hostile
 from tests.export.microcontroller.comparison import assert_same, needs_gcc
 from tests.export.test_graph import fit, hard_set
-from tests.hard_cases.models import describe
 from train.model.pipeline import Choice
 from train.model.scaling import SCALINGS
 

@@ -10,19 +10,19 @@ import pytest
 from onnxruntime import GraphOptimizationLevel
 
 import train
-from edge.classifier import Classifier
-from edge.early import fastest, stopping_rules
+from edge.decide.classifier import Classifier
+from edge.decide.early import fastest, stopping_rules
+from edge.decide.events import Decided
+from edge.decide.model import Model
+from edge.decide.verify import first_series, verify
 from edge.errors import InputError, OutOfRange
-from edge.events import Decided
-from edge.model.model import Model
-from edge.model.verify import first_series, verify
-from edge.saving import save
+from edge.record.saving import save
 from edge.touch.features import FEATURES
 from export.api import save as save_model
+from tests.checks.hard_cases import exact
+from tests.checks.hard_cases.models import session
 from tests.conftest import PAPER, export, save_touches
-from tests.edge.model.test_engines import assert_same_bits, hostile
-from tests.hard_cases import exact
-from tests.hard_cases.models import session
+from tests.edge.decide.test_engines import assert_same_bits, hostile
 from tests.sequential import fitted_model
 from train.data.dataset import load_trials
 from train.model.pipeline import Choice

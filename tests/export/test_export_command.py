@@ -11,11 +11,11 @@ import numpy as np
 import pytest
 
 from edge import demo
+from edge.decide.model import Model
+from edge.decide.statistics import wilson
 from edge.errors import InputError
-from edge.model.model import Model
-from edge.recording import Recording
-from edge.saving import save
-from edge.statistics import wilson
+from edge.record.recording import Recording
+from edge.record.saving import save
 from export.__main__ import main
 from export.cli import held_out_text
 from tests.conftest import PAPER, export

@@ -5,9 +5,9 @@ import json
 import numpy as np
 import pytest
 
+from edge.decide.metadata import to_json
+from edge.decide.model import Model
 from edge.errors import InputError
-from edge.model.metadata import to_json
-from edge.model.model import Model
 from tests.conftest import export
 from train.data.dataset import Measurement, load_trials
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from edge.model.model import Model
+from edge.decide.model import Model
 from export.golden import trials_of, trimmed
 from tests.conftest import export
 from train.data.dataset import load_trials

@@ -10,13 +10,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from onnx.reference import ReferenceEvaluator
 
-from edge.model import onnx_file
-from edge.model.graph import Graph
-from edge.model.model import Model
+from edge.decide import onnx_file
+from edge.decide.graph import Graph
+from edge.decide.model import Model
 from export.graph import to_onnx
+from tests.checks.hard_cases import exact
+from tests.checks.hard_cases.models import describe, features, labels_for, session
 from tests.conftest import sealed
-from tests.hard_cases import exact
-from tests.hard_cases.models import describe, features, labels_for, session
 from train.model.pipeline import Choice, ContactClassifier, vote
 from train.model.scaling import SCALINGS
 

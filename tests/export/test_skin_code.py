@@ -13,25 +13,25 @@ import numpy as np
 import pytest
 
 from edge import demo
-from edge.bus.crc import crc16, sealed
-from edge.bus.protocol import BusError, read, write
-from edge.bus.serial_bus import decode, encode
-from edge.chips import block
-from edge.commands import calibrate
+from edge.app.commands import calibrate
+from edge.decide.model import Model
 from edge.errors import EdgeError, InputError
-from edge.fake.clock import Hand, VirtualClock
-from edge.fake.player import calibrated, fake_buses
-from edge.model.model import Model
-from edge.skin import file as skinfile
-from edge.skin.decoder import dead_band, stuck_limits
-from edge.skin.file import TaxelCalibration
-from edge.skin.skin import Skin
+from edge.wire.bus.crc import crc16, sealed
+from edge.wire.bus.protocol import BusError, read, write
+from edge.wire.bus.serial_bus import decode, encode
+from edge.wire.chips import block
+from edge.wire.fake.clock import Hand, VirtualClock
+from edge.wire.fake.player import calibrated, fake_buses
+from edge.wire.skin import file as skinfile
+from edge.wire.skin.decoder import dead_band, stuck_limits
+from edge.wire.skin.file import TaxelCalibration
+from edge.wire.skin.skin import Skin
 from export import skin_code
 from export.cli import _write_c as write_c
 from export.cli import main
-from tests.edge.skin.test_bus_reader import SMALL
+from tests.checks.faults import KINDS, SKINS
+from tests.edge.wire.skin.test_bus_reader import SMALL
 from tests.export.microcontroller.machine import COMMON, HERE
-from tests.faults import KINDS, SKINS
 from tests.faulty import Fault, FaultyBus, one_bus
 
 pytestmark = pytest.mark.skipif(shutil.which("gcc") is None, reason="there is no gcc")

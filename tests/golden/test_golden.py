@@ -6,8 +6,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from edge.model.model import Model
-from edge.model.verify import verify
+from edge.decide.model import Model
+from edge.decide.verify import verify
 
 HERE = Path(__file__).parent
 TASKS = ("category", "mobility", "object")

@@ -3,7 +3,7 @@
 import pytest
 
 import train
-from edge.saving import save
+from edge.record.saving import save
 from train.choose.evaluate import VARIANCE
 from train.data.dataset import Measurement, load_trials
 from train.data.folds import stratified_folds

@@ -310,7 +310,7 @@ def decided_together(
     """The tasks' settings with `by_fold`, and with the accuracies of the decisions of a
     model.
 
-    A model decides tasks that agree together (`edge.model.agreement`).
+    A model decides tasks that agree together (`edge.decide.agreement`).
 
     Args:
         chosen: {task: its settings}, with the accuracies of the task by itself.

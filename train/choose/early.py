@@ -18,7 +18,7 @@ from itertools import product
 import numpy as np
 
 from edge.arrays import Booleans, Floats, Integers
-from edge.model.info import StoppingRule
+from edge.decide.info import StoppingRule
 from train.choose.evaluate import fold_numbers
 from train.data.folds import finest, stratified_folds
 from train.data.vectors import Vectors

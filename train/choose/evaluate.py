@@ -26,8 +26,8 @@ from joblib import delayed
 from numpy.typing import NDArray
 
 from edge.arrays import Booleans, Floats, Integers
+from edge.decide.statistics import wilson
 from edge.errors import InputError
-from edge.statistics import wilson
 from train.choose.answers import answers_without
 from train.choose.halving import (
     Pair,

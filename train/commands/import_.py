@@ -16,10 +16,10 @@ from dataclasses import replace
 from importlib import import_module
 from pathlib import Path
 
+from edge.app.trial_options import add_arm, open_arm
 from edge.errors import InputError, printable
-from edge.recording import Recording
-from edge.saving import save
-from edge.tools.trial_options import add_arm, open_arm
+from edge.record.recording import Recording
+from edge.record.saving import save
 from edge.touch.arm import Chain
 from edge.writing import remove_leftovers
 from train import former_recordings

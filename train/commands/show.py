@@ -8,7 +8,7 @@ recordings side by side, with the decisions of --model.
 import argparse
 from pathlib import Path
 
-from edge.commands.options import add_file, apart
+from edge.app.options import add_file, apart
 from edge.errors import InputError
 
 
@@ -38,8 +38,8 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Draw, and say where."""
-    from edge.model.model import Model
-    from edge.recording import load
+    from edge.decide.model import Model
+    from edge.record.recording import load
 
     models, recordings = apart(arguments.recording, arguments.model)
     if len(models) > 1 or not recordings:

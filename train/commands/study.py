@@ -6,7 +6,7 @@ CSV.
 
 import argparse
 
-from edge.commands.options import within
+from edge.app.options import within
 from edge.writing import check_writable
 from train.report.options import add_report_options
 

@@ -9,7 +9,7 @@ import math
 from contextlib import suppress
 
 from edge.errors import InputError
-from edge.saving import find
+from edge.record.saving import find
 from edge.writing import check_writable
 from train.report.options import add_report_options
 

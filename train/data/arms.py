@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from edge.errors import InputError
-from edge.recording import Recording
+from edge.record.recording import Recording
 from edge.touch.arm import Chain
 
 

@@ -3,12 +3,12 @@ recording."""
 
 import numpy as np
 
+from edge.app.output import counted
+from edge.app.texts import places_text
 from edge.arrays import Booleans, Integers
-from edge.commands.output import counted
-from edge.commands.texts import places_text
-from edge.recording import Recording
-from edge.skin.calibration import places
+from edge.record.recording import Recording
 from edge.touch.layout import SkinLayout
+from edge.wire.skin.calibration import places
 
 FEWEST = 3
 """Fewer recordings do not tell."""

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from edge.errors import InputError
-from edge.recording import Recording
+from edge.record.recording import Recording
 from edge.touch.contact import Contact, FeatureSeries
 from edge.touch.frame import Frame
 from edge.touch.layout import SkinLayout, for_device

@@ -18,10 +18,10 @@ from joblib import delayed
 from edge.arrays import Booleans, Floats
 from edge.errors import InputError
 from edge.files import read_bytes
-from edge.labels import read_table
-from edge.npz import LARGEST_BYTES
-from edge.recording import Recording, load
-from edge.saving import find
+from edge.record.labels import read_table
+from edge.record.npz import LARGEST_BYTES
+from edge.record.recording import Recording, load
+from edge.record.saving import find
 from edge.touch import measures
 from edge.touch.arm import Chain
 from edge.touch.contact import feature_types

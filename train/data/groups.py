@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from edge.arrays import Integers
-from edge.recording import Recording
+from edge.record.recording import Recording
 from train.data.dataset import DataSet
 from train.data.folds import FOLDS, SEED, finest, group_folds, stratified_folds
 from train.data.vectors import Labels, Strings

@@ -5,8 +5,8 @@ from collections.abc import Mapping, Sequence
 from itertools import chain, permutations
 
 from edge.errors import InputError
-from edge.labels import CATEGORY, Product
-from edge.recording import Recording, read_labels
+from edge.record.labels import CATEGORY, Product
+from edge.record.recording import Recording, read_labels
 
 NO_CONTACT = "none"
 """The label of a recording in which nothing is touched."""

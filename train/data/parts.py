@@ -3,7 +3,7 @@
 from dataclasses import replace
 from typing import Any
 
-from edge.recording import Recording
+from edge.record.recording import Recording
 
 
 def part(recording: Recording, frames: slice, **changes: Any) -> Recording:

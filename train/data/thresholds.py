@@ -7,7 +7,7 @@ from itertools import filterfalse
 
 import numpy as np
 
-from edge.recording import Recording
+from edge.record.recording import Recording
 from edge.touch.layout import for_device
 from edge.touch.thresholds import MARGIN, QUIET_S, above, noise
 from edge.touch.track import DEBOUNCE, ContactTracker

@@ -30,7 +30,7 @@ RESTS = 0.01
 
 
 def usual_touches(dataset: DataSet, window_s: float) -> dict[str, Any]:
-    """{field of `edge.model.info.ModelInfo`: what the training touches showed}."""
+    """{field of `edge.decide.info.ModelInfo`: what the training touches showed}."""
     series = [trial.series for trial in dataset.trials]
     usual: dict[str, Any] = {}
     frozen = [frame_doubts(touch, window_s)["frozen"] for touch in series]
@@ -48,7 +48,7 @@ def usual_touches(dataset: DataSet, window_s: float) -> dict[str, Any]:
 
 
 def _onset(dataset: DataSet) -> str:
-    """What tells the onsets of all trials, see `edge.model.info.ModelInfo`.
+    """What tells the onsets of all trials, see `edge.decide.info.ModelInfo`.
 
     Raises:
         InputError: it differs among the recordings.

@@ -13,11 +13,11 @@ from matplotlib.colors import PowerNorm
 from matplotlib.figure import Figure
 
 from edge.arrays import Floats
-from edge.classifier import Classifier
+from edge.decide.classifier import Classifier
+from edge.decide.events import Decided
+from edge.decide.model import Model
 from edge.errors import InputError, about
-from edge.events import Decided
-from edge.model.model import Model
-from edge.recording import Recording
+from edge.record.recording import Recording
 from edge.touch.contact import FeatureSeries
 from edge.touch.features import WINDOW_S
 from edge.touch.layout import SkinLayout

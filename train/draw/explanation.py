@@ -10,10 +10,10 @@ import matplotlib as mpl
 import numpy as np
 from matplotlib.figure import Figure
 
+from edge.app.commands.explain import explanations
+from edge.decide.model import Model
 from edge.errors import InputError
-from edge.model.model import Model
-from edge.recording import Recording, load
-from edge.tools.explain import explanations
+from edge.record.recording import Recording, load
 from edge.touch.contact import FeatureSeries
 from edge.touch.layout import SkinLayout
 from edge.writing import write_whole

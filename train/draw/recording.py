@@ -8,7 +8,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from edge.recording import Recording
+from edge.record.recording import Recording
 from edge.touch.contact import FeatureSeries
 from edge.touch.features import FEATURES, WINDOW_S
 from edge.touch.first_contact import first_contact

@@ -18,7 +18,7 @@ import pkgutil
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from edge.recording import Recording
+from edge.record.recording import Recording
 
 SHARED = {
     "axes",

@@ -11,9 +11,9 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from edge.commands.output import counted
+from edge.app.output import counted
 from edge.errors import InputError
-from edge.recording import Recording
+from edge.record.recording import Recording
 from train.importers import clock
 from train.importers.axes import Axes
 from train.importers.options import ValueOptions

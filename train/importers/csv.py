@@ -30,7 +30,7 @@ from numpy.typing import NDArray
 
 from edge.config import ConfigTable
 from edge.errors import InputError
-from edge.labels import TABLE
+from edge.record.labels import TABLE
 from edge.touch.arm import Chain
 from edge.touch.layout import RELEASE_S
 from train.importers import Refused, Trial, clock

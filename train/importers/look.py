@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 import pandas as pd
 
-from edge.recording import Recording
+from edge.record.recording import Recording
 from train.data.thresholds import count_felt
 
 ROWS = 5

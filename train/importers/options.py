@@ -6,7 +6,7 @@ from dataclasses import dataclass, fields
 from itertools import permutations
 from typing import Self
 
-from edge.commands.options import within
+from edge.app.options import within
 from train.importers.axes import LETTERS, Axes
 
 UNITS_S = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}

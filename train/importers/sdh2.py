@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from edge.config import short_text
 from edge.errors import InputError
 from edge.files import parsing
-from edge.recording import Recording
+from edge.record.recording import Recording
 from edge.touch.arm import Chain
 from edge.touch.layout import RELEASE_S, SkinLayout
 from train.importers import Trial, clock

@@ -33,7 +33,7 @@ from numpy.typing import NDArray
 
 from edge.config import short_text
 from edge.errors import InputError
-from edge.recording import Recording
+from edge.record.recording import Recording
 from edge.touch.arm import Chain
 from edge.touch.joint_angles import joint_columns
 from edge.touch.layout import RELEASE_S

@@ -55,7 +55,7 @@ def _determines(a: Strings, b: Strings) -> bool:
 
 
 def factors_of(y: Labels) -> dict[str, dict[str, tuple[int, ...]]]:
-    """{product: its `edge.model.agreement.Factors`}.
+    """{product: its `edge.decide.agreement.Factors`}.
 
     No task belongs to two products.
     """

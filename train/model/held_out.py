@@ -8,7 +8,7 @@ import numpy as np
 from joblib import delayed
 
 from edge.arrays import Booleans, Floats, Integers
-from edge.model.info import margin
+from edge.decide.info import margin
 from train.data.vectors import Strings, Vectors
 from train.model.pipeline import (
     Choice,

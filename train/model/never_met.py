@@ -13,8 +13,8 @@ import numpy as np
 from sklearn.linear_model import LogisticRegression
 
 from edge.arrays import Booleans, Floats, Integers
+from edge.decide.info import Remoteness
 from edge.elementary import log
-from edge.model.info import Remoteness
 from train.data.folds import group_folds
 from train.data.vectors import Strings
 from train.model.curves import board_logistic
@@ -67,7 +67,7 @@ def remoteness_of(known: Floats, left_out: Floats | None) -> Remoteness:
 
 def known_of(remoteness: Remoteness, scores: Floats) -> Floats:
     """(decision points, n) probabilities that things are known, as the board has them
-    (`edge.model.info.Remoteness.known`), from their remoteness."""
+    (`edge.decide.info.Remoteness.known`), from their remoteness."""
     middles = np.array(remoteness.middles)[:, None]
     slopes = np.array(remoteness.slopes)[:, None]
     return board_logistic(slopes * log(middles / np.maximum(scores, TINY)))

@@ -17,8 +17,8 @@ from scipy.spatial.distance import cdist
 from scipy.special import expit
 
 from edge.arrays import Floats, Integers
+from edge.decide.agreement import agreed
 from edge.errors import InputError
-from edge.model.agreement import agreed
 from edge.touch.features import FEATURES
 from train.data.vectors import Labels, Strings, Vectors
 from train.model.agreement import factors_of
@@ -174,7 +174,7 @@ class Decided(NamedTuple):
     Attributes:
         labels: (m,) indices.
         distances: (m, classes) of the nearest answer with each label, see
-            `label_distances`, `FittedTask.slope` and `edge.model.agreement`.
+            `label_distances`, `FittedTask.slope` and `edge.decide.agreement`.
     """
 
     labels: Integers
@@ -278,7 +278,7 @@ class ContactClassifier:
         n_trials_: how many there are.
         tasks_: {task: FittedTask}.
         products_: {task: its factors} of the tasks decided together; see
-            `edge.model.agreement`.
+            `edge.decide.agreement`.
     """
 
     choices: Choices

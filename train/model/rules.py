@@ -12,7 +12,7 @@ in `error`. So a rule's certified error is the largest upper confidence limit me
 way to it, and one table of rules serves every `error`. The confidences for the tests of
 a fold's trials come from a logistic regression on the other folds.
 
-Tasks that agree (`edge.model.agreement`) have one rule: the factors are decided when
+Tasks that agree (`edge.decide.agreement`) have one rule: the factors are decided when
 each is sure, their product when both are, and the tests count the product's errors.
 Below the smallest error that is certified for the product, its factors wait for the
 full window with it (`agreeing`).
@@ -33,8 +33,8 @@ from scipy.special import expit
 from scipy.stats import beta
 
 from edge.arrays import Booleans, Floats, Integers
-from edge.early import TEST_SHARE, is_fixed
-from edge.model.info import StoppingRule
+from edge.decide.early import TEST_SHARE, is_fixed
+from edge.decide.info import StoppingRule
 
 RISK = 0.1
 """Probability that a certificate is wrong."""

@@ -8,7 +8,7 @@ into folds, and each fold is decided by a model that was fitted, and whose setti
 chosen, without it.
 
 **Confidence.** The margin says how much nearer the training trials of the named label
-lie than those of any other (`edge.model.info.margin`). Logistic regression turns it
+lie than those of any other (`edge.decide.info.margin`). Logistic regression turns it
 into the probability that the label is right (Platt, Probabilistic outputs for support
 vector machines, 1999), at the full window by a curve of its own, before it by one of
 all points together. A curve of each early point errs more: its mean is that of few
@@ -41,9 +41,9 @@ from dataclasses import astuple, dataclass, replace
 import numpy as np
 
 from edge.arrays import Booleans, Floats, Integers
+from edge.decide.info import Novelty, Stopping, StoppingRule
 from edge.elementary import log
 from edge.errors import InputError
-from edge.model.info import Novelty, Stopping, StoppingRule
 from edge.touch.features import FEATURES
 from train.data.folds import finest, stratified_folds
 from train.data.vectors import Strings, Vectors

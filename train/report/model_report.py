@@ -11,10 +11,10 @@ from typing import Any
 import numpy as np
 from sklearn.metrics import precision_recall_fscore_support
 
+from edge.app.commands.explain import Explanation, Space, explain
+from edge.app.commands.info import doubt
 from edge.arrays import Integers
-from edge.model.model import Model
-from edge.tools.explain import Explanation, Space, explain
-from edge.tools.info import doubt
+from edge.decide.model import Model
 from train.choose.evaluate import Result
 from train.data.folds import finest, stratified_folds
 from train.data.labels import NO_CONTACT

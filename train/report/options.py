@@ -5,7 +5,7 @@ from pathlib import Path
 
 from joblib import cpu_count
 
-from edge.commands.options import within
+from edge.app.options import within
 
 
 def add_report_options(parser: argparse.ArgumentParser, out: str) -> None:

@@ -5,8 +5,8 @@ from typing import Any
 
 import numpy as np
 
-from edge import statistics
 from edge.arrays import Booleans, Floats, Integers
+from edge.decide import statistics
 from edge.touch.features import FEATURES
 from train.choose.crossval import MAX_COMPONENTS, accuracies, neighbours
 from train.choose.evaluate import Result, evaluate, nested_accuracy
@@ -118,7 +118,7 @@ def paired(before: Booleans, after: Booleans) -> tuple[float, float, float]:
     """The change of accuracy on the same trials in percentage points, and its 95 %
     interval.
 
-    The interval is that of `edge.statistics.paired`.
+    The interval is that of `edge.decide.statistics.paired`.
     """
     gained = int((after & ~before).sum())
     lost = int((before & ~after).sum())

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from edge.arrays import Floats
-from edge.recording import Recording
+from edge.record.recording import Recording
 from edge.touch.arm import Chain
 from edge.touch.contact import FeatureSeries
 from edge.touch.features import FEATURES, SAMPLES, WINDOW_S, feature_vector

@@ -8,9 +8,9 @@ from pathlib import Path
 import numpy as np
 from sklearn.neighbors import NearestNeighbors
 
+from edge.app.commands.info import doubt
 from edge.arrays import Floats
 from edge.errors import printable
-from edge.tools.info import doubt
 from edge.touch import measures
 from train.choose.protocols import HALVINGS
 from train.choose.settings import Chosen

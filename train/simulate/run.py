@@ -8,8 +8,8 @@ from itertools import chain
 from pathlib import Path
 from typing import Any
 
-from edge import saving
-from edge.recording import Recording
+from edge.record import saving
+from edge.record.recording import Recording
 from edge.writing import check_writable
 from train.simulate.arm import Array, Places
 from train.simulate.convergence import Convergence, Kind, kinds, measured

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from edge.statistics import wilson
+from edge.decide.statistics import wilson
 from train.report.figures import STROKES, legend, picture
 from train.report.section import Figure, Row, Section, Table, counted
 

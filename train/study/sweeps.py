@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from itertools import combinations
 from typing import Any
 
-from edge.recording import Recording
+from edge.record.recording import Recording
 from edge.touch.arm import Chain
 from edge.touch.features import FEATURES
 from edge.touch.layout import SkinLayout

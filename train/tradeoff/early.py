@@ -12,8 +12,8 @@ from typing import Any
 import numpy as np
 
 from edge.arrays import Booleans, Integers
-from edge.early import fastest
-from edge.model.info import Stopping
+from edge.decide.early import fastest
+from edge.decide.info import Stopping
 from train.choose.evaluate import Promise, Result
 from train.data.dataset import DataSet
 from train.data.folds import finest, stratified_folds

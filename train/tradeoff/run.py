@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from edge.errors import InputError
-from edge.recording import Recording
+from edge.record.recording import Recording
 from edge.writing import write_whole
 from train.data.dataset import DataSet, read
 from train.report.page import write

@@ -5,15 +5,15 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
-from edge.chips.ad7147 import AD7147
-from edge.chips.block import Block
-from edge.chips.chip import UNUSED, ChipSpec
-from edge.chips.three_axes import ThreeAxisBlock
-from edge.fake.player import frame_rate
-from edge.recording import Recording
-from edge.skin.file import SkinFile
-from edge.skin.wiring import BusSpec
+from edge.record.recording import Recording
 from edge.touch.layout import SkinLayout
+from edge.wire.chips.ad7147 import AD7147
+from edge.wire.chips.block import Block
+from edge.wire.chips.chip import UNUSED, ChipSpec
+from edge.wire.chips.three_axes import ThreeAxisBlock
+from edge.wire.fake.player import frame_rate
+from edge.wire.skin.file import SkinFile
+from edge.wire.skin.wiring import BusSpec
 
 STAGES = 12
 """Taxels of an AD7147."""

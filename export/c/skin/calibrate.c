@@ -1,4 +1,4 @@
-/* Rest values and noise of a skin that nothing touches: edge/commands/calibrate.py, which says why. */
+/* Rest values and noise of a skin that nothing touches: edge/app/commands/calibrate.py, which says why. */
 #include <math.h>
 #include <string.h>
 

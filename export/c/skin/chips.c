@@ -1,5 +1,5 @@
-/* Chips on their buses, read in every frame and brought back after a failure: edge/bus and
-   edge/skin/bus_reader.py, which say why. Buses are read one after the other. */
+/* Chips on their buses, read in every frame and brought back after a failure: edge/wire/bus and
+   edge/wire/skin/bus_reader.py, which say why. Buses are read one after the other. */
 #include <string.h>
 
 #include "skin_internal.h"
@@ -44,7 +44,7 @@ uint16_t ec_crc16(const uint8_t *bytes, size_t n) {
   return crc;
 }
 
-/* edge/bus/retrying.py */
+/* edge/wire/bus/retrying.py */
 static ec_i2c_outcome carry(
     uint8_t bus, uint8_t address, const uint8_t *out, size_t n, uint8_t *in, size_t m) {
   for (uint8_t failures = 0;; failures++) {
@@ -53,7 +53,7 @@ static ec_i2c_outcome carry(
   }
 }
 
-/* edge/bus/tca9548a.py */
+/* edge/wire/bus/tca9548a.py */
 static ec_i2c_outcome ask_control(const reader *bus, const mux *m, uint8_t *control) {
   return carry(bus->number, m->address, NULL, 0, control, 1);
 }
@@ -105,7 +105,7 @@ static mux *mux_of(reader *bus, const ec_chip *chip) {
   return NULL;
 }
 
-/* edge/chips */
+/* edge/wire/chips */
 static ec_i2c_outcome transfer(
     reader *bus, const ec_chip *chip, const uint8_t *out, size_t n, uint8_t *in, size_t m) {
   mux *way = mux_of(bus, chip);
@@ -171,7 +171,7 @@ static ec_i2c_outcome read_chip(reader *bus, uint16_t i) {
   return EC_I2C_DONE;
 }
 
-/* edge/skin/bus_reader.py */
+/* edge/wire/skin/bus_reader.py */
 static bool any_alive(const reader *bus) {
   for (uint16_t i = bus->first; i < bus->end; i++) {
     if (ec_slots[i].running || ec_slots[i].step >= 0) return true;

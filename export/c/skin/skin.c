@@ -1,5 +1,5 @@
-/* From the bytes of all chips to counts above a baseline that follows drift: edge/skin/decoder.py,
-   edge/skin/lone.py and edge/skin/skin.py, which say why. */
+/* From the bytes of all chips to counts above a baseline that follows drift: edge/wire/skin/decoder.py,
+   edge/wire/skin/lone.py and edge/wire/skin/skin.py, which say why. */
 #include <string.h>
 
 #include "skin_internal.h"

@@ -1,5 +1,5 @@
 /* Reads the skin: from its chips to counts above a baseline that follows drift, by the rules of
-   `edge-classify run` (edge/bus, edge/chips and edge/skin). No heap, no recursion.
+   `edge-classify run` (edge/wire/bus, edge/wire/chips and edge/wire/skin). No heap, no recursion.
 
    Compile every .c file of this folder with -std=c99 -ffp-contract=off. */
 #ifndef EC_SKIN_H
@@ -17,7 +17,7 @@ extern "C" {
 
 #define EC_TAXELS (EC_SKIN_ROWS * EC_SKIN_COLS)
 
-/* How a transaction ended: edge/bus/protocol.py. */
+/* How a transaction ended: edge/wire/bus/protocol.py. */
 typedef enum {
   EC_I2C_DONE,
   EC_I2C_NACK,    /* nothing acknowledged the address */

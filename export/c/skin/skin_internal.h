@@ -4,7 +4,7 @@
 
 #include "skin.h"
 
-/* A transaction of a set-up: `Step` in edge/chips/chip.py. */
+/* A transaction of a set-up: `Step` in edge/wire/chips/chip.py. */
 typedef struct {
   const uint8_t *out;
   const uint8_t *answer;
@@ -63,7 +63,7 @@ extern ec_calibration ec_calibration_now;
 uint64_t ec_time(void);
 uint16_t ec_crc16(const uint8_t *bytes, size_t n);
 
-/* chips.c: edge/bus and edge/skin/bus_reader.py */
+/* chips.c: edge/wire/bus and edge/wire/skin/bus_reader.py */
 typedef struct {
   uint64_t at; /* when it was last read */
   uint64_t began; /* when it was last tried */

@@ -11,8 +11,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from edge.decide.verify import integers_of
 from edge.errors import InputError
-from edge.model.verify import integers_of
 from edge.touch.cells import Cells
 from edge.touch.contact import feature_types
 from edge.touch.feature import PAPER

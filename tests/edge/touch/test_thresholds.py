@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from edge.saving import save
+from edge.record.saving import save
 from edge.touch.thresholds import above, noise
 
 QUIET = np.full((16, 24), 20, np.uint16)

@@ -7,8 +7,8 @@ from pathlib import Path
 
 import numpy as np
 
-from edge.classifier import Classifier, suited
-from edge.events import Decided, Onset, Release
+from edge.decide.classifier import Classifier, suited
+from edge.decide.events import Decided, Onset, Release
 
 HERE = Path(__file__).parent
 VECTOR, VECTORS_OF_RECORDING, COSTS, SELFTEST, EVENTS_OF_RECORDING = range(5)

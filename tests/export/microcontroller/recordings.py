@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from edge.recording import Recording
+from edge.record.recording import Recording
 
 
 def damaged(recording, rng):

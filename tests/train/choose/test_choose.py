@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 import train
-from edge.saving import save
-from edge.statistics import wilson
+from edge.decide.statistics import wilson
+from edge.record.saving import save
 from train.choose.choose import Choosing, decided_together
 from train.choose.evaluate import AnswerTable, Promise
 from train.choose.protocols import HALVINGS, Protocol, rule_among

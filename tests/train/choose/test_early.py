@@ -8,7 +8,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from edge.saving import save
+from edge.record.saving import save
 from train.choose.candidates import Fixed, candidates, features_of
 from train.choose.choose import Choosing
 from train.choose.early import (

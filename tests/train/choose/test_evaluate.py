@@ -7,8 +7,8 @@ from unittest.mock import Mock
 import numpy as np
 import pytest
 
+from edge.decide.statistics import wilson
 from edge.errors import InputError
-from edge.statistics import wilson
 from train.choose.evaluate import (
     AnswerTable,
     Promise,

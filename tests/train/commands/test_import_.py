@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from edge.recording import load
+from edge.record.recording import load
 from tests.edge.test_writing import left_by_a_dead_run
 from tests.train.importers.test_csv import write_frames
 from train.__main__ import main

@@ -1,6 +1,6 @@
 """The command that proposes thresholds."""
 
-from edge.saving import save
+from edge.record.saving import save
 from tests.train.data.test_thresholds import noisy
 from train.__main__ import main
 

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from edge.saving import save
+from edge.record.saving import save
 from tests.conftest import FOREARM, touch
 from train.choose.options import FitOptions
 from train.data.broken import BrokenTaxels

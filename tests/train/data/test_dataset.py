@@ -6,16 +6,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from edge.classifier import Classifier
+from edge.decide.classifier import Classifier
+from edge.decide.model import Model
+from edge.decide.verify import verify
 from edge.errors import InputError
-from edge.model.model import Model
-from edge.model.verify import verify
-from edge.recording import load
-from edge.saving import save
+from edge.record.recording import load
+from edge.record.saving import save
 from edge.touch.arm import Chain
 from edge.touch.features import feature_vector
 from tests.conftest import export, in_a_row
-from tests.edge.test_recording import sheared as with_shear
+from tests.edge.record.test_recording import sheared as with_shear
 from train.data.dataset import Measurement, load_trials
 
 

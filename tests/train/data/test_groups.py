@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import train
-from edge.saving import save
+from edge.record.saving import save
 from train.data.groups import fold_count, groupable, kinds_of
 
 

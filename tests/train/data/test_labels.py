@@ -3,7 +3,7 @@
 import pytest
 
 from edge.errors import InputError
-from edge.saving import save
+from edge.record.saving import save
 from train.data.dataset import load_trials
 from train.data.labels import completed, contradictory, shared_tasks
 

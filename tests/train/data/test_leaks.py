@@ -6,8 +6,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from edge.recording import Recording
-from edge.saving import save
+from edge.record.recording import Recording
+from edge.record.saving import save
 from train.data import dataset
 from train.data.dataset import read
 from train.data.leaks import leaks, without_copies

@@ -7,10 +7,10 @@ import pytest
 
 import edge
 import train
-from edge.classifier import Classifier
-from edge.events import Onset
-from edge.recording import Recording
-from edge.saving import save
+from edge.decide.classifier import Classifier
+from edge.decide.events import Onset
+from edge.record.recording import Recording
+from edge.record.saving import save
 from export.api import save as save_model
 from train.data.dataset import load_trials
 from train.data.pieces import joined

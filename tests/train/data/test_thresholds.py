@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 import train
-from edge.saving import save
+from edge.record.saving import save
 from train.data.parts import part
 from train.data.thresholds import count_contacts, proposed
 

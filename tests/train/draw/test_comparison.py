@@ -7,9 +7,9 @@ import pytest
 from matplotlib import image
 
 from edge import demo
+from edge.decide.model import Model
 from edge.errors import InputError
-from edge.model.model import Model
-from edge.recording import load
+from edge.record.recording import load
 from train.__main__ import main
 from train.draw import comparison
 

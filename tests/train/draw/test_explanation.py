@@ -4,7 +4,7 @@ trials."""
 import numpy as np
 import pytest
 
-from edge.saving import save
+from edge.record.saving import save
 from train.__main__ import main
 
 

@@ -5,8 +5,8 @@ from dataclasses import replace
 import pytest
 
 from edge import demo
-from edge.recording import load
-from edge.saving import save
+from edge.record.recording import load
+from edge.record.saving import save
 from train.__main__ import main
 
 TOUCH = demo.recordings()[0]

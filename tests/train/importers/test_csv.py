@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.io import savemat
 
-from edge.recording import load
+from edge.record.recording import load
 from tests.conftest import python
 from train.__main__ import main
 from train.importers.csv import PANDAS

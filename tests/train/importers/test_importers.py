@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from edge.errors import InputError
-from edge.recording import load
+from edge.record.recording import load
 from edge.touch.arm import Chain
 from train.__main__ import main
 from train.data.dataset import Measurement, load_trials

@@ -8,7 +8,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from edge.recording import load
+from edge.record.recording import load
 from tests.train.importers.ros import (
     COLS,
     FRAMES,

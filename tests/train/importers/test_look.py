@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from edge.recording import Recording
+from edge.record.recording import Recording
 from tests.train.importers.test_csv import put
 from train.__main__ import main
 from train.importers.look import contacts_in, rows_of

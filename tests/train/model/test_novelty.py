@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from tests.hard_cases import exact
+from tests.checks.hard_cases import exact
 from train.data.folds import stratified_folds
 from train.data.vectors import Vectors
 from train.model.novelty import (

@@ -9,7 +9,7 @@ from sklearn.neighbors import KNeighborsClassifier
 from sklearn.pipeline import make_pipeline
 
 from edge.errors import InputError
-from tests.hard_cases.models import features
+from tests.checks.hard_cases.models import features
 from train.model.pipeline import (
     Choice,
     ContactClassifier,

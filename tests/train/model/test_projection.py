@@ -5,8 +5,8 @@ import numpy as np
 import pytest
 
 from edge.errors import InputError
-from tests.hard_cases import exact
-from tests.hard_cases.models import features
+from tests.checks.hard_cases import exact
+from tests.checks.hard_cases.models import features
 from train.model.projection import Projection, Spectrum, coordinate_bits, principal_axes
 
 

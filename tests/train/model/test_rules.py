@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from scipy.stats import binom
 
-from edge.early import TEST_SHARE
-from edge.model.info import StoppingRule
+from edge.decide.early import TEST_SHARE
+from edge.decide.info import StoppingRule
 from train.model.rules import (
     NEVER,
     RISK,

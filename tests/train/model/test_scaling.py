@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from edge.errors import InputError
-from tests.hard_cases.models import features
+from tests.checks.hard_cases.models import features
 from train.model.projection import Projection
 from train.model.scaling import BY_COLUMN, OF_PAPER, centred_and_scaled, scale_of
 

@@ -5,9 +5,9 @@ import numpy as np
 import pytest
 from scipy.special import logit
 
-from edge.early import fastest
+from edge.decide.early import fastest
+from edge.decide.info import Novelty
 from edge.errors import InputError
-from edge.model.info import Novelty
 from train.data.folds import stratified_folds
 from train.model.held_out import answers
 from train.model.pipeline import Choice

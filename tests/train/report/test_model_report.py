@@ -7,9 +7,9 @@ import pytest
 
 import export
 import train
-from edge.model.model import Model
-from edge.recording import load
-from edge.saving import save
+from edge.decide.model import Model
+from edge.record.recording import load
+from edge.record.saving import save
 from export.api import measure
 from tests.conftest import rows_of
 from train.report import model_report as report

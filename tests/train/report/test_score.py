@@ -4,7 +4,7 @@ baselines."""
 import numpy as np
 import pytest
 
-from edge.statistics import paired as in_shares
+from edge.decide.statistics import paired as in_shares
 from tests.train.choose.test_evaluate import trials
 from train.choose.crossval import accuracies, neighbours
 from train.choose.search import SearchGrid

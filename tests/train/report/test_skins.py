@@ -6,7 +6,7 @@ from itertools import product
 import numpy as np
 import pytest
 
-from edge.recording import Recording
+from edge.record.recording import Recording
 from edge.touch.layout import SkinLayout
 from train.report.skins import coarser, pool, pooled, pooled_layout
 

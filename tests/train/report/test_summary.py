@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 import train
-from edge.recording import load
-from edge.saving import save
-from edge.tools.info import UNDOUBTED
+from edge.app.commands.info import UNDOUBTED
+from edge.record.recording import load
+from edge.record.saving import save
 from train.model.pipeline import ContactClassifier
 from train.report.summary import (
     LEAK,

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
-from edge.recording import load
+from edge.record.recording import load
 from tests.train.simulate.scenes import make, one_object, run, scene
 from train.__main__ import main
 from train.simulate import scene as scenes

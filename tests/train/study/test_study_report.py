@@ -14,7 +14,7 @@ import pytest
 
 from edge import demo
 from edge.errors import InputError
-from edge.saving import save
+from edge.record.saving import save
 from tests import browser
 from tests.conftest import save_touches
 from train.__main__ import main

@@ -14,9 +14,9 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from edge.model.model import Model
-from edge.recording import load
-from edge.tools.replay import decide
+from edge.app.commands.replay import decide
+from edge.decide.model import Model
+from edge.record.recording import load
 from tests.conftest import ROOT
 from tests.train.tradeoff.test_tradeoff import board_file
 from train.data.dataset import read

@@ -10,12 +10,12 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from edge.decide.info import Stopping, StoppingRule
+from edge.decide.model import Model
+from edge.decide.statistics import wilson
 from edge.errors import InputError
-from edge.model.info import Stopping, StoppingRule
-from edge.model.model import Model
-from edge.recording import load
-from edge.saving import save
-from edge.statistics import wilson
+from edge.record.recording import load
+from edge.record.saving import save
 from edge.touch.layout import SkinLayout
 from export.__main__ import main
 from tests import browser

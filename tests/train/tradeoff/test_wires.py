@@ -4,8 +4,8 @@ from dataclasses import replace
 
 import pytest
 
-from edge.skin import file as skinfile
 from edge.touch.layout import SkinLayout
+from edge.wire.skin import file as skinfile
 from train.tradeoff.wires import (
     microcontroller,
     spread,

@@ -18,7 +18,7 @@ from typing import Any
 
 import pandas as pd
 
-from edge.commands.output import counted
+from edge.app.output import counted
 from edge.config import short_text
 from edge.errors import InputError, about
 from train.importers.forms.file import File

@@ -17,9 +17,9 @@ from std_msgs.msg import String
 from vision_msgs.msg import Classification, ObjectHypothesis
 
 import edge
-from edge.fake.clock import PacedClock
-from edge.fake.player import play, skin_file
 from edge.touch.joint_stream import Joints
+from edge.wire.fake.clock import PacedClock
+from edge.wire.fake.player import play, skin_file
 
 
 def topic(task: str) -> str:

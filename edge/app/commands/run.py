@@ -1,0 +1,156 @@
+"""Read the skin and decide, live.
+
+Reads the skin and reports contacts, decisions, and chips that fail or recover. Ctrl-C,
+SIGTERM or SIGHUP ends it cleanly after the current frame, a second one at once. It
+tells systemd when it is ready and that it is alive.
+"""
+
+import argparse
+import os
+import time
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import ExitStack, closing, contextmanager
+from pathlib import Path
+from typing import Any
+
+from edge.app.options import (
+    add_engine,
+    add_error,
+    add_file,
+    add_reading,
+    check_error,
+    within,
+)
+from edge.app.output import LOG
+from edge.app.source import Opened, reading
+from edge.decide.classifier import Classifier
+from edge.decide.events import Event
+from edge.decide.model import Model
+from edge.touch.frame import Frame
+from edge.touch.track import MAX_CONTACTS
+from edge.wire.skin.loop import Schedule
+
+
+def add_options(parser: argparse.ArgumentParser) -> None:
+    """Add the command's options."""
+    add_file(parser, "model", "the model that decides", needed=True)
+    add_engine(parser)
+    add_error(parser)
+    add_reading(parser)
+    parser.add_argument(
+        "--without-joints",
+        choices=("flag", "skin"),
+        default="flag",
+        help="if joint angles are missing at a contact's onset: `flag` (the default) decides "
+        "without them, flagged missing_pose; `skin` measures the contact's motion on "
+        "the skin, flagged skin_motion",
+    )
+    parser.add_argument(
+        "--contacts",
+        type=within(int, 1, MAX_CONTACTS),
+        default=1,
+        metavar="N",
+        help="follow up to this many contacts at once; with more than 1, events have the "
+        "contact's number, and decisions its position (default: %(default)s)",
+    )
+    parser.add_argument(
+        "--keep",
+        metavar="DIR",
+        type=Path,
+        help="keep touches there as recordings with their decisions, to label and train on",
+    )
+    parser.add_argument(
+        "--keep-if",
+        default="unsure,unknown,unusual",
+        metavar="WHY",
+        help="which touches are kept: unsure, unknown, unusual, all (default: %(default)s)",
+    )
+
+
+def end_event(schedule: Schedule, frames: int, lost: int) -> dict[str, Any]:
+    """The last event: the loop's periods and the number of lines that were lost."""
+    periods = {}
+    if schedule.periods.n:
+        for percentage in (50, 99, 99.9):
+            period_ms = schedule.periods.percentile(percentage) * 1e3
+            periods[f"p{percentage:g}"] = round(period_ms, 2)
+    event = {
+        "event": "end",
+        "frames": frames,
+        "missed_ticks": schedule.missed_ticks,
+        "period_ms": periods,
+    }
+    return {**event, "lost": {"stdout": lost}} if lost else event
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Read, decide and print until the recording ends, or someone stops it."""
+    model = Model(arguments.model, arguments.engine)
+    check_error(model, arguments.error)
+    on_skin = arguments.without_joints == "skin"
+    with reading(
+        arguments,
+        model=model,
+        needs_joints=not on_skin,
+        decides=True,
+        folder=arguments.keep,
+        choices={name: task.labels for name, task in model.info.tasks.items()},
+        # Angles that another program writes go by the real clock.
+        real_time=arguments.joints is not None,
+    ) as live:
+        if live.skin.layout != model.info.layout:
+            # A skin often is the model's.
+            from edge.touch.differences import differences
+
+            for sentence in differences(model.info.layout, live.skin.layout):
+                LOG.warning(f"{arguments.model}: {sentence}")
+        classifier = Classifier(
+            model,
+            live.skin.layout,
+            error=arguments.error,
+            max_contacts=arguments.contacts,
+            motion_on_skin=on_skin,
+        )
+        with (
+            closing(live.lines()) as lines,
+            _listeners(arguments, model, live.opened) as listeners,
+        ):
+            frames = 0
+            for frame, faults in live.frames():
+                frames += 1
+                decided = classifier.push(frame)
+                for listen in listeners:
+                    listen(frame, decided)
+                lines.write([*faults, *(event.to_dict() for event in decided)])
+                live.show(frame, faults, decided)
+                if lines.gone:
+                    break
+            lines.write(event.to_dict() for event in classifier.finish())
+            lines.write([end_event(live.loop.schedule, frames, lines.lost)])
+    return 0
+
+
+@contextmanager
+def _listeners(
+    arguments: argparse.Namespace,
+    model: Model,
+    opened: Opened,
+) -> Iterator[list[Callable[[Frame, Sequence[Event]], None]]]:
+    """Functions that take in every frame with its events, where they are called for:
+    one keeps touches, another tells systemd that the program is alive."""
+    listeners: list[Callable[[Frame, Sequence[Event]], None]] = []
+    with ExitStack() as stack:
+        if arguments.keep is not None:
+            from edge.app.sinks.keeper import Keeper, reasons  # few runs keep touches
+
+            why = reasons(arguments.keep_if)
+            keeper = Keeper(arguments.keep, why, opened, model.info)
+            listeners.append(stack.enter_context(closing(keeper)).push)
+        if "NOTIFY_SOCKET" in os.environ:
+            from edge.app.sinks.systemd import Notifier  # only a service has a manager
+
+            notifier = Notifier(now=time.monotonic)
+            notifier.ready(f"reading {opened.source}")
+            stack.callback(notifier.stopping)
+            listeners.append(lambda frame, events: notifier.alive())
+        yield listeners

@@ -1,0 +1,151 @@
+"""Command-line options that several commands share, and their checks."""
+
+from __future__ import annotations
+
+import argparse
+import math
+from collections.abc import Callable
+from contextlib import suppress
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from edge.decide.model import Model
+
+NOISE_COUNTS = 0.7
+"""Noise of the fake skins that commands open. One that is calibrated with noise and then
+played without is taken for frozen."""
+
+
+def within(kind: type, low: float, high: float) -> Callable[[str], float]:
+    """The type of an option that takes an int or a float from `low` to `high`."""
+
+    def parse(text: str) -> float:
+        with suppress(ValueError):
+            value: float = kind(text)
+            if low <= value <= high:
+                return value
+        number = "a whole number" if kind is int else "a number"
+        raise argparse.ArgumentTypeError(
+            f"must be {number} from {low:g} to {high:g}, not {text!r}"
+        )
+
+    return parse
+
+
+seconds = within(float, 1e-3, 1e9)
+"""The type of an option that takes a duration."""
+
+
+def add_file(
+    parser: argparse.ArgumentParser, name: str, text: str, *, needed: bool = False
+) -> None:
+    """Add the option for a model or a skin, which `edge.app.cli.dispatch` takes as a bare
+    word too."""
+    suffix = {"model": "onnx", "skin": "toml"}[name]
+    help = f"{text}; may stand without --{name}"
+    parser.add_argument(f"--{name}", metavar=f"{name}.{suffix}", help=help)
+    if needed:
+        parser.set_defaults(needs=name)
+
+
+def apart(words: list[str], *named: str | None) -> tuple[list[str], list[str]]:
+    """The models that options name or that stand among bare words, by their suffix, and
+    the other words."""
+    bare = [word for word in words if word.endswith(".onnx")]
+    others = [word for word in words if word not in bare]
+    return [*filter(None, named), *bare], others
+
+
+def add_skin(parser: argparse.ArgumentParser) -> None:
+    """Add the options that name the skin, real or fake; `source.open_skin` opens it."""
+    add_file(parser, "skin", "the file that describes the skin")
+    parser.add_argument(
+        "--fake",
+        metavar="REC.npz",
+        help="need no hardware: play this recording onto fake chips, as fast as "
+        "possible; without --skin, the chips are chosen to suit the recording",
+    )
+    parser.add_argument(
+        "--noise",
+        type=within(float, 0.0, 1000.0),
+        default=NOISE_COUNTS,
+        metavar="COUNTS",
+        help="noise of the fake chips of a --skin, as a standard deviation (default: "
+        "%(default)g)",
+    )
+    parser.add_argument(
+        "--real-time",
+        action="store_true",
+        help="play the recording at its original speed",
+    )
+    parser.add_argument(
+        "--loop",
+        action="store_true",
+        help="play the recording over and over",
+    )
+    parser.add_argument(
+        "--seconds",
+        type=seconds,
+        default=math.inf,
+        help="stop after this time (default: never)",
+    )
+
+
+def add_reading(parser: argparse.ArgumentParser, web: str = "") -> None:
+    """Add the options of commands that read a skin live; `source.reading` reads it.
+
+    Args:
+        parser: of the command.
+        web: ends the help of the option for a live page.
+    """
+    add_skin(parser)
+    parser.add_argument(
+        "--joints",
+        metavar="stdin|udp:[HOST:]PORT",
+        help='read joint angles as JSON lines {"t": seconds, "q": [radians]}; add '
+        '"names": [joints] if they are not in the arm\'s order; without HOST, the port '
+        'listens on the loopback interface; a line {"onset": true} begins a touch, for a '
+        "model whose onsets come from outside",
+    )
+    parser.add_argument(
+        "--web",
+        metavar="HOST:PORT",
+        nargs="?",
+        const="127.0.0.1:8000",
+        help="show the skin live on a page for a browser, by default at 127.0.0.1:8000; "
+        f"open the link that is printed, with its token{web}",
+    )
+
+
+def add_error(parser: argparse.ArgumentParser) -> None:
+    """Add the option that asks for an error rate; `check_error` checks it against the
+    model."""
+    parser.add_argument(
+        "--error",
+        type=float,
+        metavar="RATE",
+        help="decide as early as possible with at most this share of wrong labels (0.1: "
+        "one in ten); without it, decide at the end of the window",
+    )
+
+
+def add_engine(parser: argparse.ArgumentParser) -> None:
+    """Add the option for the program that runs the model."""
+    parser.add_argument(
+        "--engine",
+        choices=("onnxruntime", "numpy"),
+        help="the program that runs the model; both give the same bits (default: "
+        "onnxruntime, or numpy where it is not installed)",
+    )
+
+
+def check_error(model: Model, error: float | None) -> None:
+    """Log how each task is decided under an error rate; None is not checked.
+
+    Raises:
+        InputError: the rate is outside (0, 1), or certified for no task.
+    """
+    if error is not None:
+        from edge.decide.early import log_rules  # few runs decide early
+
+        log_rules(model, error)

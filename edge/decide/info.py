@@ -1,0 +1,321 @@
+"""What a model's file says beside its graph: its tasks, its features, and its calibration:
+how sure a decision is, when it may come early, and which contacts are unusual or of
+things that were never met."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+from edge.arrays import Floats
+from edge.elementary import log, logistic
+from edge.errors import InputError
+from edge.touch.features import feature_vector, widths
+from edge.touch.layout import SkinLayout, for_device
+from edge.touch.track import ContactTracker
+
+if TYPE_CHECKING:
+    from edge.touch.arm import Chain
+    from edge.touch.contact import FeatureSeries
+    from edge.touch.kernels import KernelTable
+
+METADATA_KEY = "edge-classify"
+FORMAT = 9
+
+
+@dataclass(frozen=True)
+class Task:
+    """A question that the model answers, and how it was fitted.
+
+    Attributes:
+        labels: the answers, in the order of the scores.
+        k: neighbours that vote.
+        components: coordinates that distances are measured in.
+        scaling: "none", "columns" or "I" to "V" (paper, Eqs. 1 to 5).
+        accuracy: nested accuracy of the whole choice at export, 0 to 1.
+        projection: "pca" (principal components) or "lda" (discriminants).
+        features: the features that it takes, in the model's order; empty for all.
+        left_out: the groups left out to score the accuracy: "trial", or a label such as
+            "object".
+        no_contact: the answer for a recording that ends without a contact, or None.
+        factors: of a task that is decided together with two others; see
+            `edge.decide.agreement`.
+    """
+
+    labels: tuple[str, ...]
+    k: int
+    components: int
+    scaling: str
+    accuracy: float
+    projection: str = "pca"
+    features: tuple[str, ...] = ()
+    left_out: str = "trial"
+    no_contact: str | None = None
+    factors: Mapping[str, Sequence[int]] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Novelty:
+    """When a contact is unusual: unlike all in training, whatever the thing.
+
+    The graph scores every contact in a space of its own (`train.model.novelty`).
+
+    Attributes:
+        typical: (decision points,) scores that half of trained contacts exceed.
+        limits: (decision points,) scores that few of them exceed.
+    """
+
+    typical: tuple[float, ...]
+    limits: tuple[float, ...]
+
+    def excess(self, decision_point: int, score: float) -> float:
+        """The logarithm of a score over the typical one; 0 below it."""
+        typical = self.typical[decision_point]
+        return log(score / typical) if score > typical > 0.0 else 0.0
+
+
+@dataclass(frozen=True)
+class Remoteness:
+    """When a thing is unknown: far from all in training by what tells things apart.
+
+    Attributes:
+        limits: (decision points,) scores that few things in training exceed.
+        middles: (decision points,) scores at which a thing is as likely known as not.
+        slopes: (decision points,) by which the odds fall with the score's logarithm.
+        worth: shares of things that were left out, see `train.model.never_met`; empty
+            where none could be.
+    """
+
+    limits: tuple[float, ...]
+    middles: tuple[float, ...]
+    slopes: tuple[float, ...]
+    worth: Mapping[str, float] = field(default_factory=dict)
+
+    def known(self, decision_point: int, score: float) -> float:
+        """Probability, 0 to 1, that the thing is one of those in training."""
+        if score <= 0.0:
+            return 1.0
+        log_odds = log(self.middles[decision_point] / score)
+        return logistic(self.slopes[decision_point] * log_odds)
+
+
+def margin(distances: Sequence[float], label: int) -> float:
+    """Evidence for a label: how much farther the training trials of the nearest other
+    one lie.
+
+    Args:
+        distances: (labels,) of `edge.decide.Decision.label_distances`.
+        label: index of the label.
+
+    Returns:
+        The difference. It is minus infinity if the label's own trials are infinitely
+        far away, and 0 if there is no other label.
+    """
+    distance = distances[label]
+    rivals = [*distances[:label], *distances[label + 1 :]]
+    nearest_rival = min(rivals, default=distance)
+    return nearest_rival - distance if distance < math.inf else -math.inf
+
+
+@dataclass(frozen=True)
+class StoppingRule:
+    """Decide at the first decision point that is sure enough, and at the last one in
+    any case.
+
+    An unusual contact waits until it no longer is, or for the full window.
+
+    Attributes:
+        error: certified: decisions are wrong at most this often.
+        mean_s: mean seconds from onset to decision, on the calibration trials.
+        confidence: decide from this confidence on, by the curve of all decision points.
+            Above 1 no confidence is enough, so the rule waits for a fixed window.
+        last: decision point at which to decide in any case.
+    """
+
+    error: float
+    mean_s: float
+    confidence: float
+    last: int
+
+
+@dataclass(frozen=True)
+class Stopping:
+    """The calibration of one task's early decisions, which `train.model.stopping` makes.
+
+    Attributes:
+        slopes, intercepts, doubts: of each decision point: the probability that the
+            label is right is the logistic function of slope * `margin` + intercept -
+            doubt * `Novelty.excess`.
+        slope, intercept, doubt: the same of all decision points together, for the
+            rules.
+        rules: in the order of rising error. Mean times never rise along them.
+        trials: number of trials that certify the rules.
+        wrong: number of these trials that are decided wrongly at the full window.
+        risk: probability that a rule errs more often than its certificate says.
+        remoteness: of the task that names things, and none that is unknown; else None.
+    """
+
+    slopes: tuple[float, ...]
+    intercepts: tuple[float, ...]
+    doubts: tuple[float, ...]
+    slope: float
+    intercept: float
+    doubt: float
+    rules: tuple[StoppingRule, ...]
+    trials: int
+    wrong: int
+    risk: float
+    remoteness: Remoteness | None = None
+
+    def confidence(
+        self,
+        decision_point: int,
+        distances: Sequence[float],
+        label: int,
+        excess: float,
+        remoteness: float = 0.0,
+    ) -> float:
+        """Probability, 0 to 1, that a label is right.
+
+        Args:
+            decision_point: its index.
+            distances: (labels,) of `edge.decide.Decision.label_distances`.
+            label: its index.
+            excess: the contact's `Novelty.excess`.
+            remoteness: of the contact.
+        """
+        log_odds = self.slopes[decision_point] * margin(distances, label)
+        log_odds += self.intercepts[decision_point]
+        likely = logistic(log_odds - self.doubts[decision_point] * excess)
+        if self.remoteness is None:
+            return likely
+        return likely * self.remoteness.known(decision_point, remoteness)
+
+
+@dataclass(frozen=True)
+class ModelInfo:
+    """A model's metadata: all that the board needs besides the weights."""
+
+    tasks: dict[str, Task]
+    layout: SkinLayout
+    debounce: int
+    """Frames in a row that confirm a contact."""
+    window_s: float
+    samples: int
+    features: tuple[str, ...]
+    units: dict[str, str]
+    motion_frame: str
+    """`world` (with joint angles) or `skin`."""
+    chain: Chain | None
+    rows: int
+    """Training trials."""
+    data_digest: str
+    versions: dict[str, str] = field(default_factory=dict)
+    decision_points_s: tuple[float, ...] = ()
+    """Windows for which the model can decide, the full one last; empty without
+    calibration."""
+    stopping: dict[str, Stopping] = field(default_factory=dict)
+    """The stopping rules of each task; empty without decision points."""
+    novelty: Novelty | None = None
+    """The limits of novelty; None without decision points."""
+    joints: int = 0
+    """Number of joint angles in a frame, if a feature is made of them; else 0."""
+    kernels: Mapping[str, KernelTable] = field(default_factory=dict)
+    """{feature: its table} of the features that are made of kernels."""
+    name: str = ""
+    """The model's name."""
+    trials: tuple[str, ...] = ()
+    """(rows,) names of the training trials; empty where they were too many to be
+    kept."""
+    usual: Mapping[str, Sequence[float]] = field(default_factory=dict)
+    """{feature: the least and the greatest mean over the full window of nearly all
+    training trials}; empty without decision points."""
+    still_s: Sequence[float] = ()
+    """(dof,) seconds for which each joint stood still in nearly all training trials, at
+    the longest."""
+    repeats: bool = False
+    """Whether frames of many training touches repeat bit for bit, as of switches or coarse
+    sensors, so that this is no doubt."""
+    onset: str = ""
+    """What tells the onsets other than the skin, see `edge.touch.frame.ONSETS`; empty where
+    the skin does."""
+    speeds: Sequence[float] = ()
+    """Least and greatest speed of the joints before onset, in radians a second, for
+    which the training trials speak; empty where not known."""
+
+    @property
+    def widths(self) -> tuple[int, ...]:
+        """Number of values of each feature in a feature vector, in their order."""
+        return widths(self.features, self.samples, self.layout, self.joints)
+
+    def trial(self, row: int) -> str:
+        """The name of a training trial, or its number where the file holds no names."""
+        return self.trials[row] if self.trials else f"trial {row}"
+
+    @property
+    def width(self) -> int:
+        """Length of a feature vector."""
+        return sum(self.widths)
+
+    def vector(
+        self,
+        series: FeatureSeries,
+        window_s: float | None = None,
+    ) -> Floats:
+        """The model's `feature_vector` of a contact, by default at the full window."""
+        window_s = window_s or self.window_s
+        return feature_vector(
+            series,
+            window_s,
+            self.samples,
+            self.features,
+            self.kernels,
+        )
+
+    @property
+    def products(self) -> dict[str, Mapping[str, Sequence[int]]]:
+        """{task: its factors} of tasks that are decided together with two others."""
+        return {name: task.factors for name, task in self.tasks.items() if task.factors}
+
+    @property
+    def has_label_distances(self) -> bool:
+        """Whether the graph gives the distances of the labels."""
+        return bool(self.decision_points_s or self.products)
+
+    @property
+    def dof(self) -> int | None:
+        """Number of joint angles that a frame must have; None if the model needs
+        none."""
+        return (self.joints or None) if self.chain is None else self.chain.dof
+
+    def tracker(
+        self,
+        layout: SkinLayout,
+        *,
+        max_contacts: int = 1,
+        motion_on_skin: bool = False,
+    ) -> ContactTracker:
+        """A new tracker for a skin, with the model's rules and features.
+
+        The options are those of `ContactTracker`.
+
+        Raises:
+            InputError: the skin is not the one that the model was made for, or several
+                contacts are to have onsets from outside.
+        """
+        tracker = ContactTracker(
+            for_device(self.layout, layout),
+            self.debounce,
+            chain=self.chain,
+            horizon_s=self.window_s,
+            features=self.features,
+            joints=self.joints,
+            max_contacts=max_contacts,
+        )
+        tracker.outside = bool(self.onset)
+        if tracker.outside and max_contacts > 1:
+            raise InputError("the model's onsets come from outside; give --contacts 1")
+        tracker.motion_on_skin = motion_on_skin
+        return tracker

@@ -1,0 +1,245 @@
+"""Reads the metadata of a model file, and refuses those that contradict themselves."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+from edge.config import ConfigTable, parse_json, short_text
+from edge.decide.info import (
+    FORMAT,
+    ModelInfo,
+    Novelty,
+    Remoteness,
+    Stopping,
+    StoppingRule,
+    Task,
+)
+from edge.errors import InputError, about
+from edge.touch.contact import feature_types
+from edge.touch.feature import KERNELS
+from edge.touch.frame import ONSETS
+from edge.touch.layout import SkinLayout
+
+
+def from_json(text: str, name: str) -> ModelInfo:
+    """Read the text that `edge.decide.metadata.to_json` wrote.
+
+    Raises:
+        InputError: something is missing, of the wrong kind or a contradiction; the
+            sentence names `name`.
+    """
+    where = f"{name}: its metadata"
+    try:
+        meta = ConfigTable(parse_json(text, where), where)
+        if meta.whole("format") != FORMAT:
+            raise InputError(
+                f"{where} is of format {short_text(meta.raw['format'])}, but this "
+                f"edge-classify reads {FORMAT}"
+            )
+        info = _read(meta)
+        with about(where):
+            feature_types(info.features)
+    except InputError as error:
+        raise InputError(f"{error}; export it again") from None
+    for contradiction in _contradictions(info):
+        raise InputError(f"{name}: {contradiction}; export it again")
+    return info
+
+
+def _read(meta: ConfigTable) -> ModelInfo:
+    """Read the table of a model's metadata."""
+    tasks = meta.table("tasks")
+    task_of = {str(task): _task(tasks.table(task)) for task in tasks.raw}
+    tracking = meta.table("tracking")
+    points = meta.numbers("decision_points_s", default=())
+    names = meta.texts("features")
+    units = meta.table("units")
+    layout = SkinLayout.from_dict(meta.get("skin"), where=meta.where)
+    versions = meta.table("versions", {}).raw
+    arm = meta.get("arm", None)
+    chain = None
+    if arm is not None:
+        from edge.touch.arm import Chain  # few sensors are on an arm
+
+        chain = Chain.from_dict(arm, where=f"{meta.where}: arm")
+    stopping = {}
+    novelty = None
+    if points:
+        rules = meta.table("stopping")
+        count = len(points)
+        for task in rules.raw:
+            stopping[task] = read_stopping(rules.table(task), count)
+        table = meta.table("novelty")
+        typical = table.numbers("typical", count, low=0.0)
+        novelty = Novelty(typical, table.numbers("limits", count, low=0.0))
+    kernels = {}
+    if not KERNELS.keys().isdisjoint(names):
+        from edge.touch.kernels import read_tables  # few models have any
+
+        kernels = read_tables(meta.table("kernels"), names, layout)
+    info = ModelInfo(
+        tasks=task_of,
+        layout=layout,
+        debounce=tracking.whole("debounce", allowed=range(1, 101)),
+        window_s=meta.number("window_s", low=0.0, high=3600.0, open_low=True),
+        samples=meta.whole("samples", allowed=range(2, 10_001)),
+        features=names,
+        units={name: units.text(name) for name in names},
+        motion_frame=meta.choice("motion_frame", ("world", "skin")),
+        chain=chain,
+        rows=meta.whole("rows"),
+        data_digest=meta.text("data_digest", empty=True),
+        versions={str(key): str(version) for key, version in versions.items()},
+        decision_points_s=points,
+        stopping=stopping,
+        novelty=novelty,
+        joints=meta.whole("joints", 0, allowed=range(0, 1001)),
+        kernels=kernels,
+        name=meta.text("name", "", empty=True),
+        trials=meta.texts("trials", ()),
+        usual=_usual(meta, names),
+        still_s=meta.numbers("still_s", default=()),
+        repeats=meta.flag("repeats", False),
+        onset=meta.choice("onset", ("", *ONSETS), ""),
+        speeds=meta.numbers("speeds", 2) if meta.has("speeds") else (),
+    )
+    tracking.refuse_unknown()
+    return info
+
+
+def _task(table: ConfigTable) -> Task:
+    labels = table.texts("labels")
+    bare = {label.strip() for label in labels} - {""}
+    if not bare or len(bare) < len(labels) or not "".join(labels).isprintable():
+        raise table.fail("labels", "a list of different, printable texts")
+    factors = table.table("factors")
+    task = Task(
+        labels,
+        k=table.whole("k", allowed=range(1, 1 << 31)),
+        components=table.whole("components", allowed=range(1 << 31)),
+        scaling=table.text("scaling"),
+        accuracy=table.number("accuracy", low=0.0, high=1.0),
+        projection=table.text("projection"),
+        features=table.texts("features"),
+        left_out=table.text("left_out"),
+        no_contact=table.text("no_contact") if table.has("no_contact") else None,
+        factors={factor: factors.wholes(factor) for factor in factors.raw},
+    )
+    table.refuse_unknown()
+    return task
+
+
+def read_stopping(table: ConfigTable, points: int) -> Stopping:
+    """The calibration of a task, of a model with this number of decision points.
+
+    Raises:
+        InputError: the table is damaged.
+    """
+    trials = table.whole("trials", allowed=range(1, 1 << 31))
+    remoteness = None
+    if table.has("remoteness"):
+        remoteness = read_remoteness(table.table("remoteness"), points)
+    return Stopping(
+        slopes=table.numbers("slopes", points, low=1e-12, high=1e12),
+        intercepts=table.numbers("intercepts", points),
+        doubts=table.numbers("doubts", points, low=0.0),
+        slope=table.number("slope", low=1e-12, high=1e12),
+        intercept=table.number("intercept"),
+        doubt=table.number("doubt", low=0.0),
+        rules=tuple(
+            StoppingRule(
+                error=rule.number("error", low=0.0, high=1.0, open_low=True),
+                mean_s=rule.number("mean_s"),
+                confidence=rule.number("confidence"),
+                last=rule.whole("last", allowed=range(points)),
+            )
+            for rule in table.tables("rules", f"{table.prefix}rules")
+        ),
+        trials=trials,
+        wrong=table.whole("wrong", allowed=range(trials + 1)),
+        risk=table.number("risk", low=0.0, high=1.0, open_low=True),
+        remoteness=remoteness,
+    )
+
+
+def read_remoteness(table: ConfigTable, points: int) -> Remoteness:
+    """The doubt about names, of a model with this number of decision points.
+
+    Raises:
+        InputError: the table is damaged.
+    """
+    worth = table.table("worth")
+    return Remoteness(
+        limits=table.numbers("limits", points, low=0.0),
+        middles=table.numbers("middles", points, low=1e-9),
+        slopes=table.numbers("slopes", points, low=0.0),
+        worth={name: worth.number(name, low=0.0, high=1.0) for name in worth.raw},
+    )
+
+
+def _usual(meta: ConfigTable, names: Sequence[str]) -> dict[str, Sequence[float]]:
+    """The usual range of each feature, where the model has them."""
+    if not meta.has("usual"):
+        return {}
+    table = meta.table("usual")
+    usual: dict[str, Sequence[float]] = {}
+    for name in names:
+        lowest, highest = table.numbers(name, 2)
+        if lowest > highest:
+            raise table.fail(name, "two numbers that rise")
+        usual[name] = lowest, highest
+    return usual
+
+
+def _contradictions(info: ModelInfo) -> Iterator[str]:
+    """Contradictions in the metadata, as sentences."""
+    yield from _contradictions_of_joints(info)
+    if not info.tasks:
+        yield "its metadata names no task"
+    if info.decision_points_s and not _points_fit(info):
+        yield "its decision points are impossible"
+    if info.trials and len(info.trials) != info.rows:
+        yield f"names {len(info.trials)} of {info.rows} trials"
+    if (info.motion_frame == "world") != (info.chain is not None):
+        yield "its motion frame contradicts its arm"
+    yield from _unprintable(info)
+    yield from _contradictions_of_tasks(info)
+
+
+def _contradictions_of_joints(info: ModelInfo) -> Iterator[str]:
+    of_joints = any(feature.of_joints for feature in feature_types(info.features))
+    if info.joints != ((info.dof or None) if of_joints else 0):
+        features = "joint features" if of_joints else "no joint features"
+        yield f"names {features} but gives {info.joints} joints"
+
+
+def _unprintable(info: ModelInfo) -> Iterator[str]:
+    answers = [task.no_contact or "" for task in info.tasks.values()]
+    if not "".join([info.name, *info.tasks, *answers, *info.trials]).isprintable():
+        yield "its name, tasks, answers and trials must be printable"
+
+
+def _contradictions_of_tasks(info: ModelInfo) -> Iterator[str]:
+    """Contradictions in the tasks, as sentences."""
+    for name, task in info.tasks.items():
+        if task.components > info.width:
+            yield (
+                f"task {name!r} has {task.components} components of {info.width} "
+                "features"
+            )
+        if task.features != tuple(f for f in info.features if f in task.features):
+            yield f"task {name!r} takes other features, or in another order"
+    labels = {name: task.labels for name, task in info.tasks.items()}
+    for name, factors in info.products.items():
+        from edge.decide.agreement import factors_fit  # few models have products
+
+        if not factors_fit(factors, labels, name):
+            yield f"task {name!r} is not the product of its factors"
+
+
+def _points_fit(info: ModelInfo) -> bool:
+    """Whether decision points rise to the window, and each task has its rules."""
+    points = info.decision_points_s
+    rising = sorted({0.0, *points}) == [0.0, *points]
+    ends = points[-1] == info.window_s
+    return rising and ends and info.stopping.keys() == info.tasks.keys()

@@ -1,0 +1,48 @@
+"""The command line of a measuring program."""
+
+import argparse
+import sys
+
+from edge.app.cli import dispatch
+from edge.app.options import seconds, within
+
+
+def kind_of(default):
+    """How argparse takes an option."""
+    if default is list:
+        return {"nargs": "+", "required": True}
+    if default == []:
+        return {"nargs": "*", "default": default}
+    if isinstance(default, type):
+        return {"type": default, "required": True}
+    if isinstance(default, bool):
+        return {"action": "store_true"}
+    if isinstance(default, int):
+        return {"type": within(int, min(default, 1), 1e6), "default": default}
+    if isinstance(default, float):
+        return {"type": seconds, "default": default}
+    return {"type": type(default), "default": default}
+
+
+def start(measure, description, *options):
+    """Run a program, and exit with the status that it returns.
+
+    Args:
+        measure: a function of the options, by their names.
+        description: of the program; the help shows its first paragraph.
+        options: (name, default, help) of each. One that must be given has its type in
+            place of the default; a list takes several words.
+    """
+    top = argparse.ArgumentParser(
+        description=description.partition("\n\n")[0],
+        formatter_class=argparse.ArgumentDefaultsHelpFormatter,
+    )
+    names = [name.lstrip("-").replace("-", "_") for name, _, _ in options]
+    for name, default, text in options:
+        top.add_argument(name, help=text, **kind_of(default))
+
+    def run(arguments):
+        return measure(**{name: vars(arguments)[name] for name in names}) or 0
+
+    top.set_defaults(run=run)
+    sys.exit(dispatch(top, None))

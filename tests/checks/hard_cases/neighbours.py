@@ -1,0 +1,326 @@
+"""Neighbours: which rows are nearest, in order, by whole numbers that never round."""
+
+import numpy as np
+from hypothesis import strategies as st
+
+from tests.checks.hard_cases import exact
+from tests.checks.hard_cases.cases import SEEDS, Case, Ladder, decades, powers_of_ten
+from tests.checks.hard_cases.models import (
+    USUAL,
+    Ours,
+    features,
+    labels_for,
+    usual_neighbours,
+)
+from train.model.pipeline import Choice
+from train.model.projection import FEWEST_UNITS
+from train.report.summary import coarseness
+
+MANY = 1400
+WHOLE = "Python's whole numbers"
+LISTS = "queries with another neighbour, order, label or distance"
+
+
+def near_duplicates(n, spread, seed, count=24):
+    """Clusters whose rows differ by `spread` of their norm, and queries like them."""
+    rng = np.random.default_rng(seed)
+    base = features(8, seed)
+
+    def jittered(rows):
+        return rows * (1.0 + spread * rng.normal(size=rows.shape))
+
+    return jittered(np.repeat(base, n // 8, axis=0)), jittered(
+        base[rng.integers(0, 8, count)]
+    )
+
+
+def offset_data(offset, sd, seed, n=160):
+    """Vectors far from zero."""
+    rng = np.random.default_rng(seed)
+    return offset + sd * rng.normal(size=(n, 120)), offset + sd * rng.normal(
+        size=(24, 120)
+    )
+
+
+def far_data(factor, seed, n=160):
+    """Queries outside the training set."""
+    return features(n), features(8, seed) * factor
+
+
+def lattice(seed, n=160):
+    """Whole numbers in three columns, and queries midway between rows: pairs lie
+    equally far."""
+    rng = np.random.default_rng(seed)
+    X = np.zeros((n, 120))
+    queries = np.zeros((24, 120))
+    half = rng.integers(-3, 4, (n // 2, 3))
+    X[:, [0, 40, 80]] = np.concatenate([half, -half])  # the mean is exactly 0
+    queries[:, [0, 40, 80]] = rng.integers(-6, 7, (24, 3)) / 2.0
+    return X, queries
+
+
+def duplicates(n, seed):
+    """Rows that stand four times in the set, and the first of them as queries."""
+    order = np.random.default_rng(seed).permutation(n)
+    X = np.repeat(features(n // 4, seed), 4, axis=0)[order]
+    return X, X[:40]
+
+
+def dominated(power, seed):
+    """One feature is 10^power times as large as the others, which alone separate the
+    rows."""
+    rng = np.random.default_rng(seed)
+    X = features(160, seed)
+    X[:, :40] = np.rint(2.0 * rng.random((160, 40))) * 10.0**power
+    queries = X[rng.integers(0, 160, 24)]
+    queries[:, 40:] *= 1.0 + 1e-6 * rng.normal(size=(24, 80))
+    return X, queries
+
+
+def denormals(times, seed):
+    """One feature has a few of the smallest numbers of float64; the others are
+    ordinary."""
+    X = features(160, seed)
+    queries = features(24, seed + 1)
+    smallest = float(np.finfo(np.float64).smallest_subnormal)
+    X[:, :40] = (
+        np.random.default_rng(seed).integers(0, 50, (160, 40)) * times * smallest
+    )
+    queries[:, :40] = X[:24, :40]
+    return X, queries
+
+
+def wrong(data, choice):
+    """The error of a case: wrong answers to the queries of `data`."""
+
+    def error(**at):
+        X, queries = data(**at)
+        return Ours(X, choice=choice).wrong(queries)
+
+    return error
+
+
+def ties_error(k, seed):
+    X = features(160, seed)
+    ours = Ours(X, labels_for(X, 12, seed), Choice("none", 6, k))
+    return ours.wrong(features(40, seed + 1))
+
+
+def discriminants_error(shrinkage, seed):
+    """Wrong answers of a projection fitted to the labels, with ties of equal rows."""
+    X = features(60, seed)
+    X[30:40] = X[:10]
+    choice = Choice("III", 4, 4, projection="lda", shrinkage=shrinkage)
+    return Ours(X, labels_for(X, 5, seed), choice).wrong(X[::3])
+
+
+def far_error(factor, seed, n=160):
+    """Wrong answers, and queries that were cut off without a word or flagged without
+    need."""
+    X, queries = far_data(factor, seed, n)
+    ours = Ours(X)
+    p = ours.projection
+    d = (queries - p.mean_) * p.gain_
+    z = d @ p.weights_ / p.grid_.unit
+    off = (np.abs(d / p.grid_.step).max(axis=1) > 2.0**24) | (
+        np.abs(z).max(axis=1) > p.grid_.limit
+    )
+    flags = [ours.model.decide(query)["t"].out_of_range for query in queries]
+    return ours.wrong(queries) + float((off != flags).sum())
+
+
+class Outlier:
+    """A training set of which one row lies far outside all others.
+
+    Args:
+        factor: by which it is moved away from the mean.
+        seed: of the set.
+
+    Attributes:
+        named: whether export warns of the row.
+        changed: share of queries whose nearest row is not that of unrounded numbers.
+    """
+
+    def __init__(self, factor, seed):
+        X = features(160, seed)
+        X[80] += (factor - 1.0) * (X[80] - X.mean(axis=0))
+        queries = features(200, seed + 1)
+        ours = Ours(X, choice=Choice("none", 6, 1))
+        p = ours.projection
+        rows = ours.fitted.tasks_["t"].space.rows
+        self.named = coarseness(rows, p.grid_.unit) < FEWEST_UNITS
+        vectors = np.concatenate([X, queries])
+        points = exact.unrounded(vectors, p.mean_, p.weights_)
+        truth = [exact.nearest(points[:160], point, 1)[0][0] for point in points[160:]]
+        nearest = ours.alone(queries)["neighbours"][:, 0]
+        self.changed = float(np.mean(nearest != truth))
+
+
+def outlier_error(factor, seed):
+    """Share of other nearest rows; 0 where export names the row that is to blame."""
+    outlier = Outlier(factor, seed)
+    return 0.0 if outlier.named else outlier.changed
+
+
+def grid_error(spread, seed):
+    """Largest error of a distance, over the longest training row, against unrounded
+    numbers."""
+    X, queries = near_duplicates(80, spread, seed, 8)
+    ours = Ours(X, choice=Choice("none", 6, 80))
+    graph = ours.alone(queries)
+    p = ours.projection
+    true = exact.unrounded(np.concatenate([X, queries]), p.mean_, p.weights_).astype(
+        float
+    )
+    z = ours.fitted.tasks_["t"].space.rows
+    true *= np.linalg.norm(z) / np.linalg.norm(
+        true[:80]
+    )  # proportional numbers, to 1e-7
+    distances = np.linalg.norm(true[80:, None] - true[:80], axis=2)
+    errors = np.abs(
+        graph["distances"] - np.take_along_axis(distances, graph["neighbours"], axis=1)
+    )
+    return float(errors.max() / np.linalg.norm(z, axis=1).max())
+
+
+def few_error(n, classes, same):
+    X = np.repeat(features(1), n, axis=0) if same else features(n)
+    ours = Ours(X, labels_for(X, classes), Choice("none", 6, n))
+    return ours.wrong(np.concatenate([X[:5], features(3, 1)]))
+
+
+def answers(name, error, hazard, around, ladder=None, usual=None):
+    """A row whose answers whole numbers judge."""
+    around = around | {"seed": SEEDS} if "seed" in hazard[0] else around
+    key = f"neighbours: {name}"
+    return Case(key, WHOLE, LISTS, error, hazard, around, ladder, usual, examples=4)
+
+
+BY_ROWS = {
+    "hazard": [{"n": 160, "seed": 0}, {"n": MANY, "seed": 0}],
+    "around": {"n": st.just(160)},
+    "ladder": Ladder("training rows", [160, 1400], "n", "856 and 140"),
+}
+
+CASES = [
+    answers(
+        "near-duplicate rows, spread 1e-7 to 1e-2 of the norm",
+        wrong(near_duplicates, USUAL),
+        [{"n": n, "spread": 1e-7, "seed": 0} for n in (160, MANY)],
+        {"n": st.just(160), "spread": powers_of_ten(-7, -2)},
+        Ladder(
+            "spread over norm",
+            decades(-2, -14, 0.5),
+            "spread",
+            "1e-6 (856 real grasps) and 3e-5 (cody18)",
+        ),
+    ),
+    Case(
+        "neighbours: distances of near-duplicates",
+        "fractions, nothing rounded",
+        "error over the longest training row",
+        grid_error,
+        [{"spread": 1e-7, "seed": 0}],
+        {"spread": powers_of_ten(-9, -2), "seed": SEEDS},
+        Ladder(
+            "spread over norm",
+            decades(-2, -12, 1),
+            "spread",
+            "1e-6 (856 real grasps) and 3e-5 (cody18)",
+        ),
+        lambda: (
+            "at a spread of "
+            + "; ".join(
+                f"{s:g}, {usual_neighbours(*near_duplicates(160, s, 0))}"
+                for s in (1e-5, 1e-6, 1e-7)
+            )
+        ),
+        examples=3,
+        bound=1e-6,
+    ),
+    Case(
+        "neighbours: one training row far outside all others",
+        "fractions, nothing rounded",
+        "share of other nearest rows, unless export names the row",
+        outlier_error,
+        [{"factor": factor, "seed": 0} for factor in (1e2, 1e3, 1e6)],
+        {"factor": powers_of_ten(0.0, 8.0), "seed": SEEDS},
+        Ladder("times as far out", decades(0, 12, 0.5), "factor", "1"),
+        examples=4,
+        bound=0.02,
+    ),
+    answers(
+        "offset 1e6, deviation 0.01",
+        wrong(offset_data, USUAL),
+        [{"offset": 1e6, "sd": 0.01, "seed": 0}],
+        {"offset": st.floats(-1e6, 1e6), "sd": st.sampled_from([0.01, 0.1, 1.0])},
+        Ladder(
+            "offset, of a deviation of 0.01",
+            decades(4, 15, 1),
+            "offset",
+            "0.036 and 0.014",
+        ),
+        lambda: usual_neighbours(*offset_data(1e6, 0.01, 0)),
+    ),
+    answers("exact duplicates", wrong(duplicates, Choice("IV", 20, 4)), **BY_ROWS),
+    answers(
+        "equal distances",
+        wrong(lattice, Choice("none", 6, 8)),
+        **BY_ROWS,
+    ),
+    answers(
+        "vote ties with even k",
+        ties_error,
+        [{"k": k, "seed": 0} for k in (2, 4, 6)],
+        {"k": st.integers(1, 20)},
+        Ladder("neighbours that vote", [2, 8, 32, 160], "k"),
+    ),
+    answers(
+        "one row, one class, all rows the same, k as large as the training set",
+        few_error,
+        [
+            {"n": 1, "classes": 1, "same": False},
+            {"n": 30, "classes": 1, "same": False},
+            {"n": 12, "classes": 3, "same": True},
+            {"n": 480, "classes": 7, "same": False},
+        ],
+        {"n": st.integers(1, 90), "classes": st.integers(1, 4), "same": st.booleans()},
+    ),
+    answers(
+        "a feature much larger than those that separate the rows",
+        wrong(dominated, Choice("none", 6, 5)),
+        [{"power": power, "seed": 0} for power in (3.0, 12.0)],
+        {"power": st.floats(3.0, 16.0)},
+        Ladder("decades larger", [3, 6, 9, 12, 16, 20], "power"),
+    ),
+    answers(
+        "a feature of denormal numbers",
+        wrong(denormals, Choice("III", 6, 5)),
+        [{"times": 1, "seed": 0}],
+        {"times": st.integers(1, 2**30)},
+        Ladder("of the smallest numbers", [2**20, 2**10, 1], "times"),
+    ),
+    answers(
+        "discriminants",
+        discriminants_error,
+        [{"shrinkage": 0.1, "seed": 0}],
+        {"shrinkage": powers_of_ten(-4, 0)},
+        Ladder("shrinkage", decades(0, -12, 0.5), "shrinkage"),
+    ),
+    Case(
+        "neighbours: queries outside the training set: cut off, and flagged",
+        WHOLE,
+        f"{LISTS}, or a flag that is wrong",
+        far_error,
+        [{"factor": factor, "seed": 0} for factor in (1.0, 10.0, 1e6)],
+        {"factor": powers_of_ten(0, 6), "seed": SEEDS},
+        Ladder(
+            "distance over range",
+            decades(0, 160, 0.1),
+            "factor",
+            "0.5 and 0.1 of the set's size",
+        ),
+        lambda: usual_neighbours(*far_data(1e6, 0)),
+        examples=3,
+    ),
+]

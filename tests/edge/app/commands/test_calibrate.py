@@ -1,0 +1,291 @@
+"""`edge-classify calibrate`: exact means and deviations, and a skin that must be at
+rest."""
+
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from edge.app.commands import calibrate
+from edge.app.commands.calibrate import (
+    NOISY,
+    NOISY_COUNTS,
+    Sums,
+    measure,
+    noisiest_taxels,
+    standing_out,
+    unusable,
+)
+from edge.app.options import NOISE_COUNTS
+from edge.record import recording, saving
+from edge.wire.skin import file as skinfile
+from edge.wire.skin.decoder import dead_band
+from tests.edge.test_writing import left_by_a_dead_run
+
+
+def test_a_taxel_is_noisy_beyond_the_limit_and_not_at_it():
+    noise = np.full((3, 4), 2.0)
+    noise[0, 1] = NOISY * 2.0 + NOISY_COUNTS
+    assert noisiest_taxels(noise) == []
+    noise[2, 3], noise[1, 0] = noise[0, 1] + 1.0, noise[0, 1] + 9.0
+    assert noisiest_taxels(noise) == [(1, 0), (2, 3)]
+
+
+@pytest.fixture
+def measured(edge, skin):
+    """Calibrate the skin from a recording; returns status, event and stderr."""
+
+    def run(recording, *options, frames=30):
+        fake = ("--skin", skin, "--fake", recording, "--frames", frames, "--yes")
+        status, events, err = edge("calibrate", *fake, *options)
+        return status, events[0] if events else None, err
+
+    return run
+
+
+def test_the_fakes_rest_values_are_measured_and_the_old_file_is_kept(
+    edge,
+    skin,
+    quiet,
+    measured,
+):
+    leftover = left_by_a_dead_run(skin.parent)
+    before = skin.read_text()
+    status, event, _ = measured(quiet)
+    assert status == 0
+    assert not leftover.exists()
+    assert event["frames"] == 30
+    assert event["kept"] == 0
+    assert Path(event["backup"]).read_text() == before
+    file = skinfile.load(skin)
+    assert (file.calibration.baseline == 20946).all()
+    assert "\ntaken = 20" in skin.read_text()
+    assert edge("check", skin)[1][0]["remarks"] == []
+
+
+@pytest.mark.parametrize(
+    ("options", "deviation"),
+    # Rounding to whole counts adds a variance of 1/12.
+    [((), (NOISE_COUNTS**2 + 1 / 12) ** 0.5), (("--noise", 3), (9 + 1 / 12) ** 0.5)],
+)
+def test_a_fake_makes_noise_so_that_its_dead_bands_are_rehearsed(
+    skin,
+    quiet,
+    measured,
+    options,
+    deviation,
+):
+    assert measured(quiet, "--noise", 0)[1]["noise_largest"] == 0.0
+    first, repetition = (measured(quiet, *options, frames=90)[1] for _ in range(2))
+    assert first == repetition
+    file = skinfile.load(skin)
+    assert (file.calibration.noise**2).mean() ** 0.5 == pytest.approx(
+        deviation, rel=0.03
+    )
+    assert dead_band(file.signal, file.calibration.noise).min() >= 4 * deviation
+
+
+def test_a_skin_that_is_touched_is_refused(skin, make_touch, tmp_path, measured):
+    touched = tmp_path / "touched.npz"
+    saving.save(touched, make_touch(arm=False))
+    before = skin.read_text()
+    status, _, err = measured(touched)
+    assert status == 2
+    assert "taxels that vary while they should be at rest: 9, by up to " in err
+    assert skin.read_text() == before
+    assert measured(touched, "--force")[0] == 0
+
+
+@pytest.fixture(
+    params=[
+        (
+            20946,
+            0.4,
+            "the first at [0, 2], which was valid in 12 of 30 frames and rests at "
+            "20946",
+        ),
+        (0, 1.0, "was valid in 30 of 30 frames and rests at 0"),
+        (65535, 1.0, "rests at 65535; check the chips"),
+    ]
+)
+def unusable_taxel(request, monkeypatch):
+    """Lets the measurement of a taxel give a value that is of no use, or is valid in a
+    share of the frames alone; and the sentence on it."""
+    value, share, sentence = request.param
+
+    def spoiled(*arguments):
+        result = measure(*arguments)
+        result.calibration.baseline[0, 2] = value
+        result.valid[0, 2] = share * result.frames
+        return result
+
+    return partial(monkeypatch.setattr, calibrate, "measure", spoiled), sentence
+
+
+def test_taxels_that_are_not_read_or_saturated_are_refused_without_former_values(
+    skin, quiet, measured, unusable_taxel
+):
+    spoil, sentence = unusable_taxel
+    spoil()
+    status, _, err = measured(quiet, "--force")
+    assert status == 2
+    assert skinfile.load(skin).calibration is None
+    assert sentence in err
+
+
+def test_taxels_that_are_not_read_or_saturated_keep_their_former_values_by_force(
+    skin, quiet, measured, unusable_taxel
+):
+    spoil, sentence = unusable_taxel
+    assert measured(quiet)[0] == 0
+    before = skin.read_text()
+    spoil()
+    status, _, err = measured(quiet)
+    assert status == 2
+    assert sentence in err
+    assert skin.read_text() == before
+    status, event, err = measured(quiet, "--force")
+    assert status == 0
+    assert event["kept"] == 1
+    assert "their former values are kept" in err
+    assert skinfile.load(skin).calibration.baseline[0, 2] == 20946
+
+
+def test_only_the_values_of_a_block_may_rest_at_0():
+    shares = np.ones((8, 12))
+    pad = skinfile.load(skinfile.shipped("mpr121"))
+    assert unusable(pad, np.zeros((8, 12), np.uint16), shares).all()
+    assert unusable(pad, np.full((8, 12), 1023, np.uint16), shares).all()
+    matrix = skinfile.load(skinfile.shipped("matrix"))
+    shape = matrix.layout.shape
+    assert not unusable(matrix, np.zeros(shape, np.uint16), np.ones(shape)).any()
+
+
+def test_mean_and_deviation_are_exact_at_a_large_offset():
+    draw = np.random.default_rng(0)
+    values = (60000 + draw.integers(-2, 3, (5000, 4, 6))).astype(np.int64)
+    values[:, 0, 0] = 65535
+    sums = Sums((4, 6))
+    for frame in values:
+        sums.add(frame.astype(np.uint16), np.ones((4, 6), bool))
+    mean, deviation = sums.mean_and_deviation()
+    np.testing.assert_array_equal(mean, np.rint(values.mean(axis=0)))
+    exact = (values - 60000).astype(np.float64).std(axis=0, ddof=1)
+    exact[0, 0] = 0.0
+    np.testing.assert_allclose(deviation, exact, rtol=1e-12, atol=1e-12)
+
+
+SIX = [(5, 5), (5, 6), (5, 7), (6, 5), (6, 6), (6, 7)]
+
+
+@pytest.fixture
+def leant(quiet, tmp_path):
+    """Record a skin of which some taxels rest higher, steadily."""
+
+    def save(counts, taxels):
+        still = recording.load(quiet)
+        for row, col in taxels:
+            still.frames[:, row, col] = counts
+        saving.save(tmp_path / "leant.npz", still)
+        return tmp_path / "leant.npz"
+
+    return save
+
+
+@pytest.fixture
+def calibrated(skin, quiet, measured):
+    """A skin file that was calibrated at rest."""
+    assert measured(quiet)[0] == 0
+    return skin
+
+
+def test_what_leans_lightly_on_a_fifth_of_the_skin_is_refused(
+    calibrated,
+    measured,
+    leant,
+):
+    fifth = [(row, col) for row in range(16) for col in range(5)]
+    assert "80 taxels side by side rest off" in measured(leant(50, fifth))[2]
+
+
+@pytest.mark.parametrize(
+    ("former", "compared"),
+    [("calibrated", "off the former calibration"), ("skin", "beyond the others")],
+)
+def test_a_skin_that_something_leans_on_steadily_is_refused(
+    request,
+    measured,
+    leant,
+    former,
+    compared,
+):
+    skin = request.getfixturevalue(former)
+    before = skin.read_text()
+    path = leant(120, SIX)
+    status, _, err = measured(path)
+    assert status == 2
+    assert f"6 taxels side by side rest {compared}" in err
+    assert skin.read_text() == before
+    status, _, err = measured(path, "--force")
+    assert status == 0
+    assert f"rest {compared}, [5, 5], [5, 6], [5, 7], [6, 5]" in err
+
+
+def test_a_first_calibration_asks_whether_the_whole_skin_is_pressed(
+    edge, skin, measured, leant
+):
+    before = skin.read_text()
+    pressed = leant(5000, [(slice(None), slice(None))])
+    status, _, err = edge(
+        "calibrate", "--skin", skin, "--fake", pressed, "--frames", 20
+    )
+    assert status == 2
+    assert "the chips at 25946 to 25946, an AD7147 usually at 16384 to 49152" in err
+    assert skin.read_text() == before
+    assert measured(pressed)[0] == 0
+
+
+@pytest.mark.parametrize(("counts", "taxels"), [(120, SIX[:1]), (40, SIX)])
+def test_a_single_taxel_or_a_small_drift_is_calibrated(
+    calibrated,
+    measured,
+    leant,
+    counts,
+    taxels,
+):
+    status, _, err = measured(leant(counts, taxels))
+    assert status == 0
+    is_named = "1 taxel far off the former calibration at rest: [5, 5]; if" in err
+    assert is_named == (len(taxels) == 1)
+
+
+def test_taxels_side_by_side_stand_out_of_a_skin_that_rests_at_0():
+    file = skinfile.load(skinfile.shipped("matrix"))
+    zero = np.zeros(file.layout.shape, np.uint16)
+    zero[3:6, 3:6] = 300
+    assert np.count_nonzero(standing_out(file, zero)) == 9
+
+
+def test_electrodes_of_unequal_wires_stand_out_only_where_they_are_touched():
+    pad = skinfile.load(skinfile.shipped("electrodes"))
+    rest = np.array([600, 612, 575, 590, 640, 605, 566, 597, 621, 580, 615, 599])
+    assert not standing_out(pad, rest.reshape(4, 3).astype(np.uint16)).any()
+    rest[[4, 7]] -= 200  # a touch lowers the values of an MPR121
+    touched = standing_out(pad, rest.reshape(4, 3).astype(np.uint16))
+    assert np.argwhere(touched > pad.layout.onset).tolist() == [[1, 1], [2, 1]]
+
+
+def test_a_calibration_that_would_make_taxels_deaf_is_refused(
+    edge,
+    calibrated,
+    quiet,
+    measured,
+):
+    status, _, err = measured(quiet, "--noise", 9)
+    assert status == 2
+    assert "would be deaf" in err
+    assert measured(quiet, "--noise", 9, "--force")[0] == 0
+    status, (event,), _ = edge("check", calibrated)
+    assert status == 1
+    assert any("taxels deaf, such as" in remark for remark in event["remarks"])

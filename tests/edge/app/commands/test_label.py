@@ -1,0 +1,222 @@
+"""Labels of recordings, listed and changed."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from edge.record.labels import TABLE
+from edge.record.recording import load
+from edge.record.saving import find, save
+from tests.edge.app.kept import kept_meta
+
+
+@pytest.fixture
+def folder(make_touch, tmp_path):
+    """Two hard things, the second with labels of its own for its contacts."""
+    save(tmp_path / "a.npz", make_touch(seed=0))
+    touch = make_touch(seed=1)
+    contacts = [{"object": "hard 1"}, {"object": "hard 2"}]
+    save(tmp_path / "b.npz", replace(touch, meta={**touch.meta, "contacts": contacts}))
+    return tmp_path
+
+
+@pytest.fixture
+def a(folder):
+    """The path of the first."""
+    return folder / "a.npz"
+
+
+def test_the_labels_of_a_folder_are_listed_and_its_files_left_alone(folder, a, edge):
+    before = a.read_bytes()
+    status, lines, _ = edge("label", folder)
+    assert status == 0
+    assert lines[0] == {
+        "event": "labels",
+        "file": str(a),
+        "labels": {"category": "rigid-fixed", "object": "hard 0"},
+        "kinds": [],
+    }
+    assert a.read_bytes() == before
+
+
+def test_a_label_that_would_act_on_a_terminal_is_counted_as_an_escape(a, edge):
+    touch = load(a)
+    save(a, replace(touch, meta={**touch.meta, "labels": {"object": "\x1b[2J"}}))
+    status, _, err = edge("label", a)
+    assert status == 0
+    assert err.endswith("object (1 of 1): _[2J 1\n")
+    assert "\x1b" not in err
+
+
+def test_a_file_is_relabelled_and_keeps_all_else(a, edge):
+    before = load(a)
+    new = ("--set", "object=brick", "--set", "softness=rigid", "--yes")
+    _, lines, _ = edge("label", a, *new)
+    after = load(a)
+    assert lines[0]["labels"] == after.labels
+    assert after.labels == {
+        "category": "rigid-fixed",
+        "object": "brick",
+        "softness": "rigid",
+    }
+    assert (after.frames == before.frames).all()
+    assert {**after.meta, "labels": before.labels} == before.meta
+
+
+def test_the_label_of_a_task_is_taken_away(a, edge):
+    edge("label", a, "--unset", "object", "--yes")
+    assert load(a).labels == {"category": "rigid-fixed"}
+
+
+def test_what_cannot_be_changed_leaves_every_file_as_it_was(a, refused):
+    err = refused("label", a.parent, "--set", "object=x", "--yes")
+    assert "the contacts of b.npz have labels of their own" in err
+    assert not (a.parent / TABLE).exists()
+
+
+@pytest.mark.parametrize("second", [("--set", "object=lid"), ("--unset", "object")])
+def test_a_task_with_two_changes_is_refused(a, refused, second):
+    before = a.read_bytes()
+    message = refused("label", a, "--set", "object=box", *second, "--yes")
+    assert "name a task twice" in message
+    assert a.read_bytes() == before
+
+
+def test_nothing_changes_before_it_is_shown_and_agreed_to(a, refused):
+    before = a.read_bytes()
+    err = refused("label", a, "--set", "object=brick")
+    assert "object=hard 0 becomes category=rigid-fixed object=brick" in err
+    assert "1 recording would change, as shown; add --yes to do it" in err
+    assert a.read_bytes() == before
+
+
+@pytest.fixture
+def kept(make_touch, tmp_path):
+    """Kept touches: a sure one, an unsure one, a wrong one, and one that is unknown."""
+    touch = make_touch()
+    cases = {
+        "sure": kept_meta({}, softness=("soft", 0.95)),
+        "unsure": kept_meta({}, softness=("hard", 0.6)),
+        "wrong": kept_meta({"softness": "soft"}, softness=("hard", 0.9)),
+        "unknown": kept_meta({}, object=("unknown", None), softness=("soft", 0.9)),
+    }
+    for name, meta in cases.items():
+        path = tmp_path / "kept" / f"{name}.npz"
+        save(path, replace(touch, meta={**touch.meta, **meta}))
+    return tmp_path / "kept"
+
+
+@pytest.mark.parametrize(
+    ("words", "expected"),
+    [
+        (["unsure"], ["unknown", "unsure"]),
+        (["object", "unsure"], ["unknown"]),
+    ],
+)
+def test_touches_are_listed_by_what_asks_for_a_look(kept, edge, words, expected):
+    options = [f"--only={word}" for word in words]
+    _, lines, _ = edge("label", kept, *options)
+    assert [Path(line["file"]).stem for line in lines] == expected
+
+
+def test_a_touch_is_listed_with_its_decisions_and_what_asks_for_a_look(kept, edge):
+    (line,) = edge("label", kept / "unsure.npz")[1]
+    assert line["decided"]["softness"]["label"] == "hard"
+    assert line["kinds"] == ["unsure", "unlabelled"]
+
+
+def test_a_decision_is_accepted_where_it_names_a_label_and_nobody_has(kept, edge):
+    edge("label", kept, "--accept", "--yes")
+    after = {path.stem: load(path).labels for path in find([str(kept)])}
+    assert after == {
+        "sure": {"softness": "soft"},
+        "unsure": {"softness": "hard"},
+        "wrong": {"softness": "soft"},
+        "unknown": {"softness": "soft"},
+    }
+
+
+def test_a_decision_is_accepted_but_for_what_is_corrected(kept, edge):
+    edge("label", kept / "unsure.npz", "--accept", "--set", "softness=soft", "--yes")
+    assert load(kept / "unsure.npz").labels == {"softness": "soft"}
+
+
+def test_that_no_touch_is_of_a_kind_is_said(kept, edge):
+    status, _, err = edge("label", kept / "sure.npz", "--only", "wrong")
+    assert status == 1
+    assert "none of 1 recording is of this kind" in err
+
+
+def test_all_that_have_a_label_get_another_and_slips_are_told_with_their_files(
+    make_touch, tmp_path, edge
+):
+    for number in range(9):
+        name = "cupp" if number < 1 else "cup"
+        save(tmp_path / f"{number}.npz", make_touch(labels={"object": name}))
+    err = edge("label", tmp_path)[2]
+    slip = f"'cupp': is it 'cup'? (1 of 9 recordings: {tmp_path / '0.npz'})"
+    assert slip in err
+    lines = edge(
+        "label", tmp_path, "--only", "object=cupp", "--set", "object=cup", "--yes"
+    )
+    assert [line["file"] for line in lines[1]] == [str(tmp_path / "0.npz")]
+    assert {load(path).labels["object"] for path in find([str(tmp_path)])} == {"cup"}
+
+
+def test_a_word_of_only_that_is_no_state_or_task_is_refused(kept, refused):
+    err = refused("label", kept, "--only", "softnes=soft")
+    assert "unsure, wrong, unlabelled, left_out, object, softness, or TASK=LABEL" in err
+
+
+def test_what_is_left_out_is_listed_so_and_put_back(kept, edge):
+    edge("label", kept / "sure.npz", "--leave-out", "--yes")
+    assert len(find([str(kept)])) == 3
+    (line,) = edge("label", kept, "--only", "left_out")[1]
+    assert line["kinds"] == ["unlabelled", "left_out"]
+    edge("label", kept, "--put-back", "--yes")
+    assert len(find([str(kept)])) == 4
+
+
+def test_each_recording_gets_its_row_for_a_spreadsheet(kept, edge):
+    edge("label", kept, "--rows", "--yes")
+    rows = (kept / TABLE).read_text("utf-8-sig").splitlines()
+    assert rows[0] == "file,softness,left_out"
+    assert rows[-1] == "wrong.npz,soft,"
+    (kept / TABLE).write_text("file;softness\nwrong.npz;hard\n", "utf-8-sig")
+    assert edge("label", kept / "wrong.npz")[1][0]["labels"] == {"softness": "hard"}
+
+
+def test_the_last_change_is_taken_back_in_all_of_its_folders(kept, edge, make_touch):
+    save(kept / "more" / "a.npz", make_touch())
+    edge("label", kept / "wrong.npz", "--set", "softness=firm", "--yes")
+    edge("label", kept, "--set", "softness=squashy", "--yes")
+    status, _, err = edge("label", kept, "--undo")
+    assert status == 0
+    assert err.count("is as before `edge-classify label") == 2
+    labels = {path.stem: load(path).labels for path in find([str(kept)])}
+    assert labels["wrong"] == {"softness": "firm"}
+    assert "softness" not in labels["a"]
+    edge("label", kept, "--undo")
+    assert load(kept / "wrong.npz").labels == {"softness": "soft"}
+    assert edge("label", kept, "--undo")[0] == 2
+
+
+def test_what_reads_leaves_a_folder_of_a_former_release_as_it_is_and_names_it(
+    kept, edge
+):
+    change = '{"labels": {"sure.npz": [{}, null]}}'
+    (kept / ".edge-classify-labels.json").write_text(change)
+    (kept / ".edge-classify-deleted").mkdir()
+    (kept / TABLE).write_text("file,object\ngone.npz,cup\n")
+    before = sorted(kept.rglob("*"))
+    err = edge("label", kept)[2]
+    assert sorted(kept.rglob("*")) == before
+    assert ".edge-classify-labels.json: a change of labels" in err
+    assert ".edge-classify-deleted: recordings that a former release deleted" in err
+    assert "labels.csv, line 2: there is no gone.npz here" in err
+
+
+def test_undo_takes_a_folder(kept, refused):
+    err = refused("label", kept / "mistyped", "--undo")
+    assert "mistyped: --undo takes the folder of the recordings" in err

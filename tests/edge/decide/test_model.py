@@ -1,0 +1,327 @@
+"""A model file: what is refused, and what a decision says."""
+
+import json
+import re
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import onnx
+import pytest
+from onnx import TensorProto, helper
+
+from edge.decide.info import FORMAT, METADATA_KEY
+from edge.decide.metadata import to_json
+from edge.decide.metadata_reader import from_json
+from edge.decide.model import Model
+from edge.errors import InputError, OutOfRange
+from tests.conftest import sealed
+
+
+@pytest.fixture(scope="module")
+def golden(exported):
+    return np.load(exported / "golden.npz")
+
+
+@pytest.fixture
+def altered(exported, tmp_path):
+    """Write the exported model with a change; returns the new path."""
+
+    def write(change):
+        proto = onnx.load(exported / "model.onnx")
+        change(proto)
+        path = tmp_path / "altered.onnx"
+        path.write_bytes(sealed(proto))
+        return path
+
+    return write
+
+
+def test_a_byte_that_changed_since_the_export_is_noticed(exported, tmp_path):
+    data = bytearray((exported / "model.onnx").read_bytes())
+    path = tmp_path / "damaged.onnx"
+    for place in np.linspace(0, len(data) - 65, 20).astype(int):
+        path.write_bytes(bytes([*data[:place], data[place] ^ 16, *data[place + 1 :]]))
+        with pytest.raises(InputError, match="changed or damaged since its export"):
+            Model(path)
+
+
+def test_metadata_say_how_features_are_measured(model):
+    info = model.info
+    assert info.window_s == 1.2
+    assert info.samples == 40
+    assert info.units == {
+        "max_force": "newton",
+        "contact_area": "taxel",
+        "contact_motion": "metre",
+    }
+    assert info.motion_frame == "world"
+    assert info.chain.dof == 5
+
+
+def test_metadata_are_read_as_they_were_written(model):
+    info = model.info
+    assert to_json(from_json(to_json(info), "again")) == to_json(info)
+
+
+def test_a_decision_is_the_graphs_answer_and_stays_so_after_further_ones(model, golden):
+    task = model.info.tasks["object"]
+    vectors = golden["vectors"][: len(golden["onset_s"])]
+    for i, decision in enumerate(
+        [model.decide(vector)["object"] for vector in vectors]
+    ):
+        assert decision.label == task.labels[golden["object_label"][i]]
+        assert decision.scores.tolist() == golden["object_scores"][i].tolist()
+        assert decision.votes == golden["object_scores"][i].max()
+        assert decision.confidence is None  # not calibrated
+        assert decision.neighbours.tolist() == golden["object_neighbours"][i].tolist()
+        assert decision.distances.tolist() == golden["object_distances"][i].tolist()
+        assert not decision.out_of_range
+
+
+def test_a_value_far_outside_the_training_set_is_cut_off_and_flagged(model, golden):
+    vector = golden["vectors"][0].copy()
+    vector[39] = 1e290
+    decision = model.decide(vector)["object"]
+    assert decision.out_of_range
+    vector[39] = 1e200
+    assert (
+        model.decide(vector)["object"].distances.tolist() == decision.distances.tolist()
+    )
+    vector[39] = 1.7e308  # which is infinite once it is scaled
+    with pytest.raises(InputError, match="too large"):
+        model.decide(vector)
+
+
+@pytest.mark.parametrize("shape", [(119,), (121,), (1, 120), ()])
+def test_a_vector_of_another_length_is_refused(model, shape):
+    with pytest.raises(InputError, match="takes 120 features"):
+        model.decide(np.zeros(shape))
+
+
+def test_a_missing_model_and_a_folder_are_named(tmp_path):
+    with pytest.raises(InputError, match="no such model; make one with `make export`"):
+        Model(tmp_path / "none.onnx")
+    with pytest.raises(InputError, match="cannot be read"):
+        Model(tmp_path)
+
+
+def no_metadata(proto):
+    del proto.metadata_props[:]
+
+
+def another_attribute(proto):
+    proto.graph.node[0].attribute.append(helper.make_attribute("unheard_of", 1))
+
+
+def another_input(proto):
+    proto.graph.input.append(
+        helper.make_tensor_value_info("more", TensorProto.DOUBLE, [1])
+    )
+
+
+def edited(edit):
+    """The change of a model that edits its metadata."""
+
+    def change(proto):
+        entry = next(p for p in proto.metadata_props if p.key == METADATA_KEY)
+        metadata = json.loads(entry.value)
+        edit(metadata)
+        entry.value = json.dumps(metadata) if metadata else "{"
+
+    return change
+
+
+def meta(**changes):
+    return edited(lambda metadata: metadata.update(changes))
+
+
+def category(**changes):
+    return edited(lambda metadata: metadata["tasks"]["category"].update(changes))
+
+
+REFUSED = {
+    no_metadata: "no edge-classify metadata",
+    another_attribute: "ONNX Runtime refuses it",
+    another_input: "has an input more",
+    edited(dict.clear): "its metadata: not JSON",
+    meta(samples=30): "no tensor(double) features of shape [90], which its metadata",
+    meta(
+        window_s="soon"
+    ): "window_s must be a number above 0, at most 3600, not 'soon'",
+    meta(arm=None): "motion frame contradicts its arm",
+    meta(tasks={}): "no task",
+    meta(features=["noise"], units={"noise": "1"}): "no feature 'noise'",
+    meta(
+        units={"max_force": "newton"}
+    ): "units.contact_area is missing; export it again",
+    edited(
+        lambda m: m["features"].reverse()
+    ): "task 'category' takes other features, or in another order",
+    meta(speeds=[0.3]): "speeds must be a list of 2 numbers",
+    meta(trials=["a"]): "names 1 of 16 trials",
+    edited(
+        lambda m: m["tasks"]["category"]["labels"].append("liquid")
+    ): "no tensor(double) category_scores of shape [3]",
+    edited(
+        lambda m: m["tasks"].update(mobility=m["tasks"]["category"])
+    ): "no tensor(int64) mobility_label",
+    # Three objects would have one pair of labels.
+    edited(
+        lambda m: m["tasks"]["object"].update(
+            factors={"category": [0, 0, 1, 1], "mobility": [0, 0, 0, 1]}
+        )
+    ): "task 'object' is not the product of its factors",
+    category(
+        labels=["soft", "soft"]
+    ): "labels must be a list of different, printable texts",
+    category(
+        components=10**9
+    ): "task 'category' has 1000000000 components of 120 features",
+    meta(tracking={"debounce": 0}): "debounce must be a whole number from 1 to 100",
+    edited(
+        lambda m: m["skin"].update(counts_per_newton=1e-300)
+    ): "counts_per_newton must be a number from 1e-09 to 1e+09, not 1e-300",
+    edited(
+        lambda m: m.update(usual={name: [2.0, 1.0] for name in m["features"]})
+    ): "usual.max_force must be two numbers that rise, not",
+    meta(name="arm\n"): "its name, tasks, answers and trials must be printable",
+    category(no_contact="nothing\a"): "answers and trials must be printable",
+    category(
+        labels=["soft", "soft "]
+    ): "category.labels must be a list of different, printable texts",
+}
+
+
+@pytest.mark.parametrize("change", REFUSED, ids=REFUSED.values())
+def test_a_model_that_is_not_ours_is_refused_in_one_sentence(change, altered):
+    path = altered(change)
+    with pytest.raises(InputError, match=re.escape(REFUSED[change])) as caught:
+        Model(path)
+    assert str(path) in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+def with_factors(info, labels, softness, mobility):
+    """Metadata whose category is a product of softness and mobility."""
+    task = info.tasks["category"]
+    tasks = {
+        "category": replace(
+            task,
+            labels=labels,
+            factors={"softness": softness, "mobility": mobility},
+        ),
+        "softness": replace(task, labels=("rigid", "soft")),
+        "mobility": replace(task, labels=("fixed", "movable")),
+    }
+    return to_json(replace(info, tasks=tasks))
+
+
+def test_labels_that_are_made_of_their_factors_labels_stand_for_these(model):
+    names = ("rigid-fixed", "rigid-movable", "soft-fixed", "soft-movable")
+    text = with_factors(model.info, names, [0, 0, 1, 1], [0, 1, 0, 1])
+    assert from_json(text, "m").tasks["category"].labels == names
+    lying = with_factors(model.info, names, [1, 1, 0, 0], [0, 1, 0, 1])
+    with pytest.raises(InputError, match="'category' is not the product of its"):
+        from_json(lying, "m")
+    free_names = ("wall", "box", "sofa", "pillow")
+    free = with_factors(model.info, free_names, [1, 1, 0, 0], [0, 1, 0, 1])
+    assert from_json(free, "m").tasks["category"].labels == free_names
+
+
+RELEASED = Path(__file__).parents[2] / "golden" / "released"
+
+
+@pytest.mark.parametrize(
+    "path",
+    sorted(RELEASED.glob("*.onnx")),
+    ids=lambda path: path.stem,
+)
+def test_a_model_of_each_released_format_is_read_or_refused_with_the_remedy(path):
+    """`format-N.onnx` stays here when format N is no longer written."""
+    number = int(path.stem.removeprefix("format-"))
+    if number == FORMAT:
+        assert Model(path).info.tasks
+        return
+    with pytest.raises(InputError) as error:
+        Model(path)
+    assert str(error.value) == (
+        f"{path}: its metadata is of format {number}, but this edge-classify reads "
+        f"{FORMAT}; "
+        "export it again"
+    )
+
+
+class Underived:
+    """An engine that leaves open the sizes of one output."""
+
+    name = "underived"
+
+    def __init__(self, engine, output):
+        self.run = engine.run
+        self.inputs = engine.inputs
+        kind, sizes = engine.outputs[output]
+        self.outputs = engine.outputs | {output: (kind, [sizes[0], "unknown"])}
+
+
+def test_sizes_that_an_older_runtime_does_not_derive_are_left_to_the_run(
+    exported, monkeypatch
+):
+    model = Model(exported / "model.onnx")
+    engine = model._engine
+    monkeypatch.setattr(model, "_engine", Underived(engine, "object_scores"))
+    model._check()
+    assert len(model.decide(np.zeros(model.info.width))["object"].scores) == 4
+    monkeypatch.setattr(model, "_engine", Underived(engine, "object_label"))
+    with pytest.raises(
+        InputError, match=r"no tensor\(int64\) object_label of shape \[\]"
+    ):
+        model._check()
+
+
+def test_a_graph_that_answers_a_row_with_a_scalar_is_refused(altered):
+    def scalar(proto):
+        node = next(n for n in proto.graph.node if "out_of_range" in n.output)
+        node.CopyFrom(
+            helper.make_node("ReduceSum", [node.input[0]], ["out_of_range"], keepdims=0)
+        )
+        output = next(x for x in proto.graph.output if x.name == "out_of_range")
+        del output.type.tensor_type.shape.dim[:]
+
+    model = Model(altered(scalar))
+    with pytest.raises(
+        InputError, match=r"out_of_range has the shape \(\)\); copy or export it"
+    ):
+        model.decide(np.zeros(model.info.width))
+
+
+@pytest.mark.parametrize(
+    ("shares", "tie"),
+    [
+        ([0.5, 0.25, 0.25, 0.0], False),
+        ([0.25, 0.375, 0.375, 0.0], True),
+    ],
+)
+def test_a_tie_is_of_two_labels_or_more_with_the_most_votes(
+    model,
+    monkeypatch,
+    shares,
+    tie,
+):
+    vector = np.zeros(model.info.width)
+    outputs = model.run(vector[None])
+    label = np.array([int(np.argmax(shares))])
+    outputs |= {"object_scores": np.array([shares]), "object_label": label}
+    monkeypatch.setattr(model, "run", lambda *arguments: outputs)
+    decision = model.decide(vector)["object"]
+    assert decision.tie == tie
+    assert decision.votes == max(shares)
+
+
+def test_a_vector_that_one_task_refuses_is_decided_for_none(model, golden, monkeypatch):
+    outputs = model.run(golden["vectors"][:1])
+    for task in model.info.tasks:
+        refused = {**outputs, f"{task}_label": np.array([-1])}
+        monkeypatch.setattr(model, "run", lambda *_, answer=refused: answer)
+        with pytest.raises(OutOfRange, match="too large to be scaled"):
+            model.decide(golden["vectors"][0])

@@ -1,0 +1,115 @@
+"""The fake refuses what real adapters refuse, and its time and faults come only when
+asked for."""
+
+import errno
+
+import pytest
+
+from edge.wire.bus.protocol import (
+    BusError,
+    BusGone,
+    BusRefused,
+    fetch,
+    read,
+    send,
+    write,
+)
+from edge.wire.fake.bus import FakeChip, FakeTCA9548A
+from tests.faulty import Fault, FaultyBus
+
+
+class Echo(FakeChip):
+    """Serves what was written to it."""
+
+    def __init__(self, first=0):
+        self.kept = bytes([first]) * 64
+
+    def write(self, data, t):
+        self.kept = data + self.kept[len(data) :]
+
+    def read(self, n, t):
+        return self.kept[:n].ljust(n, b"\0")
+
+    def reset(self):
+        self.kept = bytes(64)
+
+
+def bus(**options):
+    return FaultyBus(chips={0x10: Echo(), 0x70: FakeTCA9548A()}, **options)
+
+
+@pytest.mark.parametrize(
+    ("messages", "code"),
+    [
+        ([read(0x10, 2), write(0x10, [1])], errno.EOPNOTSUPP),  # Raspberry Pi up to 4
+        ([read(0x10, 2), read(0x10, 2)], errno.EOPNOTSUPP),
+        ([write(0x70, [1]), write(0x10, [0])], errno.EINVAL),  # Raspberry Pi 5
+        ([write(0x70, [1]), read(0x10, 2)], errno.EINVAL),
+    ],
+)
+def test_shapes_that_some_adapter_refuses_are_refused(messages, code):
+    fake = bus()
+    with pytest.raises(BusRefused) as caught:
+        fake.transfer(fake.prepare(*messages))
+    assert caught.value.errno == code
+
+
+def test_a_mux_connects_at_stop_and_two_chips_at_one_address_pull_the_same_wire(
+    monkeypatch,
+):
+    fake = bus()
+    mux = fake.chips[0x70]
+    connected = []
+    mux.channels[0][0x20], mux.channels[1][0x20] = Echo(0b1100), Echo(0b1010)
+
+    def note(data, t):
+        type(mux).write(mux, data, t)
+        connected.append(mux.connected)
+
+    monkeypatch.setattr(mux, "write", note)
+    send(fake, 0x70, [3])
+    assert connected == [[]]
+    assert mux.connected == [0, 1]
+    assert fetch(fake, 0x20, b"", 1) == bytes([0b1000])
+
+
+def test_time_advances_by_the_bits_only_where_it_is_asked_for():
+    still = bus()
+    timed = bus(timed=True, clock_hz=100_000)
+    for fake in (still, timed):
+        fetch(fake, 0x10, b"\x00", 4)
+        assert fake.bits == 1 + 18 + 1 + 45 + 1
+    assert still.now() == 0.0
+    assert timed.now() == pytest.approx(66 / 100_000)
+
+
+def test_faults_hit_the_transactions_that_they_name_and_a_hung_one_costs_the_timeout():
+    faults = [Fault(code=errno.EIO, at=[1, 3]), Fault(code=errno.ETIMEDOUT, at=[4])]
+    fake = bus(timed=True, clock_hz=1e9, timeout_s=0.03, faults=faults)
+    codes = []
+    for _ in range(6):
+        try:
+            send(fake, 0x10, [0])
+            codes.append(0)
+        except BusError as error:
+            codes.append(error.errno)
+    assert codes == [0, errno.EIO, 0, errno.EIO, errno.ETIMEDOUT, 0]
+    assert fake.transactions == 6
+    assert fake.met == 3
+    assert fake.now() == pytest.approx(0.03, rel=1e-3)
+
+
+def test_an_unplugged_adapter_is_gone_until_it_is_back_and_opened_again():
+    fake = bus(faults=[Fault(code=errno.ENODEV, during=(1.0, 2.0))])
+    send(fake, 0x10, [0])
+    fake.sleep(1.5)
+    with pytest.raises(BusGone):
+        send(fake, 0x10, [0])
+    with pytest.raises(BusGone):
+        fake.reopen()
+    fake.close()
+    fake.sleep(1.0)
+    with pytest.raises(BusGone):
+        send(fake, 0x10, [0])
+    fake.reopen()
+    send(fake, 0x10, [0])

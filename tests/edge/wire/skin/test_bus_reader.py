@@ -1,0 +1,332 @@
+"""The skin meets the faults of its buses (`python -m tests.checks.faults` plays all of
+them)."""
+
+import errno
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from edge.wire.bus.protocol import BusRefused, bus_error
+from edge.wire.bus.retrying import LONGEST_REST_S, MOST_CREDIT, RESTS
+from edge.wire.chips.ad7147 import DEVICE_ID, IDENTIFIED_EVERY
+from edge.wire.fake.clock import VirtualClock
+from edge.wire.fake.player import calibrated
+from edge.wire.skin.bus_reader import SET_UP_AFTER, SET_UP_EVERY, BusReader
+from edge.wire.skin.loop import Loop
+from edge.wire.skin.skin import SILENT_FRAMES, Skin
+from tests.checks.faults import (
+    BACK_S,
+    KINDS,
+    LEAST_BESIDE,
+    LEAST_VALID,
+    REPEATED,
+    SHARES,
+    SKINS,
+    Pattern,
+    run,
+    scripts,
+    share,
+    sweep,
+)
+from tests.faulty import Fault, faulty_buses, faulty_skin, one_bus
+
+
+def shrunk(file):
+    """Cody's skin with two of its buses, each with two chips on two of its channels."""
+    taxels = iter(np.arange(8 * 12).reshape(8, 12).tolist())
+    buses = []
+    for bus in file.buses[:2]:
+        chips = [
+            replace(bus.chips[i], taxels=tuple(next(taxels))) for i in (0, 1, 4, 5)
+        ]
+        buses.append(replace(bus, chips=tuple(chips)))
+    layout = replace(file.layout, rows=4)
+    file = replace(file, layout=layout, buses=tuple(buses), calibration=None)
+    return calibrated(file)
+
+
+CODY = SKINS["cody"]
+SMALL = shrunk(CODY)
+SWEPT = {
+    "cody": (SMALL, 23, 61),
+    "mpr121": (SKINS["mpr121"], 23, 61),
+    "one bus": (one_bus(SMALL), 23, 61),
+    "block": (SKINS["block"], 3, 2),
+}
+"""Skins; one position in so many of a frame and of the set-up is tried."""
+ROWS = {name: (file, faults) for name, file, faults in scripts()}
+UNKNOWABLE = [name for name in ROWS if name.endswith("*")]
+"""The protocol has nothing that would tell these."""
+QUIET = np.zeros((4, 24), dtype=np.uint16)
+
+
+def hang(faults):
+    """Whether one of the faults lasts until the bus's timeout."""
+    return any(f.code == errno.ETIMEDOUT and f.kind == "error" for f in faults)
+
+
+@pytest.mark.parametrize("name", [n for n in ROWS if n not in UNKNOWABLE])
+def test_a_fault_gives_no_wrong_value_and_costs_no_other_chip(name):
+    file, faults = ROWS[name]
+    enough = SMALL if file is CODY and faults[0].rate == 1.0 else file
+    outcome = run(name, enough, faults, seconds=1.6)
+    assert outcome.met > 0
+    assert outcome.wrong == 0
+    assert outcome.elsewhere == 0
+    assert outcome.back_s < BACK_S
+    assert outcome.missed_ticks <= 3 * outcome.met * hang(faults)
+
+
+@pytest.mark.parametrize("overhead_us", [0, 100])
+@pytest.mark.parametrize("name", SKINS)
+def test_after_a_brown_out_every_taxel_is_back_in_half_a_second_also_when_it_repeats(
+    name, overhead_us
+):
+    for resets in (REPEATED[:1], REPEATED[:3]):
+        lasts = {"seconds": (resets[-1] + 60) / SKINS[name].reading.rate_hz}
+        outcome = run(
+            name,
+            SKINS[name],
+            resets=resets,
+            overhead_s=overhead_us * 1e-6,
+            **lasts,
+        )
+        assert outcome.wrong == 0
+        assert outcome.back_s <= BACK_S
+        assert outcome.missed_ticks == 0
+
+
+@pytest.mark.parametrize("name", SWEPT)
+@pytest.mark.parametrize("set_up", [False, True])
+def test_one_fault_anywhere_gives_no_wrong_value(name, set_up):
+    """Other positions are tried for each kind."""
+    file, *steps = SWEPT[name]
+    every = steps[set_up]
+    for k, fault in enumerate(KINDS.values()):
+        at = {"set_up": set_up, "every": every, "first": 31 * k % every}
+        outcome = sweep(name, file, fault, overhead_s=100e-6, **at)
+        assert outcome.met > 0, fault
+        assert outcome.wrong == 0, fault
+        assert outcome.back_s < BACK_S, fault
+
+
+def test_no_result_depends_on_registers_that_power_up_leaves_undefined():
+    def frames(seed):
+        clock = VirtualClock()
+        feels = Pattern(CODY)
+        buses = faulty_buses(CODY, feels, clock, timed=True, seed=seed)
+        with Skin(CODY, buses, clock=clock) as skin:
+            skin.start()
+            skin.readers[0].bus.chips[0x70].channels[1][0x2D].reset()
+            return [skin.read().counts for _ in range(8)]
+
+    np.testing.assert_array_equal(frames(0), frames(1))
+
+
+def test_a_frame_that_breaks_off_before_its_last_byte_is_read_again():
+    """All other bytes are intact, and the rest of the last value might be one."""
+    feels = Pattern(CODY)
+    met = wrong = 0
+    with faulty_skin(CODY, feels, timed=True) as skin:
+        bus = skin.readers[0].bus
+        for position in range(15):
+            bus.inject([replace(KINDS["a frame that breaks off"], at=[position])], 0)
+            bus.random = SimpleNamespace(randrange=lambda n: n - 1)
+            wrong += feels.wrong(skin.read())
+            met += bus.met
+    assert met == 15
+    assert wrong == 0
+
+
+@pytest.fixture
+def running():
+    """A skin, the model of one of its chips, and the chip's slot."""
+    with faulty_skin(SMALL, Pattern(SMALL)) as skin:
+        first = skin.readers[0]
+        yield skin, first.bus.chips[0x70].channels[1][0x2D], first.slots[3]
+
+
+@pytest.mark.parametrize("channels", [0, 1 << 3, 1 << 0 | 1 << 1])
+def test_the_next_frame_after_another_program_selected_channels_is_valid(
+    running, channels
+):
+    skin, _, _ = running
+    for reader in skin.readers:
+        mux = reader.bus.chips[0x70]
+        mux.write(bytes([channels]), 0.0)
+        mux.stop()
+    frame = skin.read()
+    assert frame.valid.all()
+    assert Pattern(SMALL).wrong(frame) == 0
+
+
+def test_a_damaged_stage_register_is_found_by_reading_the_stages_in_turn(running):
+    """13 rows of 4 chips, one every 4 frames; the values meanwhile look plausible."""
+    skin, model, slot = running
+    model.write(b"\0\x81\x12\x34", 0.0)
+    for _ in range(13 * 4 * 4):
+        skin.read()
+    assert slot.running
+    assert model.registers[0x81] == 0x1FFF
+
+
+def test_another_chip_at_an_address_gives_no_value_from_the_next_look_at_its_identity(
+    running,
+):
+    skin, model, slot = running
+    taxels = list(slot.spec.taxels)
+    model.registers[DEVICE_ID] = 0x1492
+    valid = [skin.read().valid.flat[taxels].any() for _ in range(IDENTIFIED_EVERY)]
+    assert not valid[-1]
+    for _ in range(SET_UP_AFTER + 1):
+        assert not skin.read().valid.flat[taxels].any()
+    assert "its identity reads 0x1492, not 0x147x" in str(slot.error)
+
+
+def test_a_chip_that_keeps_its_settings_but_converts_nothing_is_set_up_again_now_and_then(
+    running,
+):
+    skin, model, slot = running
+    model._sense = lambda t: np.zeros(12, dtype=np.uint16)
+    set_up_in = []
+    for frame in range(1, SET_UP_AFTER + SET_UP_EVERY + 10):
+        driver = slot.chip
+        skin.read()
+        set_up_in += [] if slot.chip is driver else [frame]
+    assert set_up_in == [SET_UP_AFTER + 1, SET_UP_AFTER + SET_UP_EVERY + 1]
+
+
+def test_an_adapter_that_refuses_the_drivers_transactions_is_an_error_at_the_start():
+    clock = VirtualClock()
+    refused = [Fault(code=errno.EOPNOTSUPP)]
+    buses = faulty_buses(SMALL, lambda t: QUIET, clock, faults=refused)
+    rows = [np.zeros(26, np.uint8)] * 4
+    with pytest.raises(BusRefused, match="refuses a transaction of this shape"):
+        BusReader(buses[0], SMALL.buses[0], rows, SMALL.reading).start()
+
+
+def changes(skin, seconds):
+    """Time and status of each chip whose state changes."""
+    frames = Loop(skin, lasts_s=seconds).frames()
+    return [
+        (round(frame.t, 3), status) for frame in frames for status in skin.changes()
+    ]
+
+
+def test_the_user_hears_of_a_chip_that_fails_and_comes_back():
+    lost = Fault(bus=SMALL.buses[1].device, channel=1, address=0x2D, during=(0.1, 0.2))
+    with faulty_skin(SMALL, lambda t: QUIET, faults=[lost]) as skin:
+        (failed_at, down), (back_at, up) = changes(skin, 0.7)
+    assert failed_at == 0.1
+    assert down.state == "down"
+    assert down.spec.address == 0x2D
+    assert down.error.endswith("check its power, wiring and address (EREMOTEIO)")
+    assert up.state == "running"
+    assert up.error == ""
+    assert back_at == pytest.approx(0.1 + SILENT_FRAMES * 0.01)
+
+
+def test_a_loose_wire_is_told_twice_a_second_at_most():
+    """It breaks and holds ten times a second."""
+    chip = {"bus": SMALL.buses[1].device, "channel": 1, "address": 0x2D}
+    loose = [Fault(**chip, during=(0.1 * k, 0.1 * k + 0.05)) for k in range(1, 31)]
+    with faulty_skin(SMALL, lambda t: QUIET, faults=loose) as skin:
+        heard = [status.state for _, status in changes(skin, 3.6)]
+    assert heard[0] == "down"
+    assert heard[-1] == "running"
+    assert len(heard) <= 8
+
+
+def test_a_good_reading_earns_one_credit_and_a_failure_costs_one():
+    with faulty_skin(SMALL, Pattern(SMALL)) as skin:
+        reader = skin.readers[0]
+        slot = reader.slots[3]
+        credits = []
+        for _ in range(MOST_CREDIT + 1):
+            credits.append(slot.credit)
+            skin.read()
+        reader.bus.inject([Fault(code=errno.ETIMEDOUT, at=[0], address=0x2C)])
+        skin.read()
+    assert credits == [*range(1, MOST_CREDIT + 1), MOST_CREDIT]
+    # Read again at the frame's end, the first chip has earned its credit back.
+    assert [slot.credit for slot in reader.slots] == [MOST_CREDIT] * 4
+    slot.fail(reader.slots[0].error or bus_error(errno.EIO, "bus"))
+    assert slot.credit == MOST_CREDIT - 1
+
+
+@pytest.mark.parametrize("kind", SHARES)
+def test_faults_of_one_in_five_cost_few_frames(kind):
+    assert share(kind, 0.2, seconds=2.0).read >= LEAST_VALID[0.2]
+
+
+def test_a_chip_that_hangs_costs_the_others_few_frames():
+    kind = "timeouts of one AD7147"
+    assert share(kind, 1.0, seconds=4.0).beside >= LEAST_BESIDE
+
+
+def test_a_bus_that_hangs_is_tried_seldom_and_is_back_soon_after():
+    """Two chips hang in one frame, so that no third one is tried."""
+    hangs = Fault(code=errno.ETIMEDOUT, during=(0.1, 3.1))
+    with faulty_skin(SMALL, Pattern(SMALL), timed=True) as skin:
+        bus = skin.readers[0].bus
+        start = skin.clock.now()
+        bus.inject([hangs.later(start)])
+        frames = list(Loop(skin, lasts_s=4.0).frames())
+    last = max(frame.t for frame in frames if not frame.valid.all())
+    assert last - start < 3.1 + BACK_S
+    assert bus.met <= 3 + 3.0 / RESTS / bus.timeout_s
+
+
+def test_a_chip_that_cannot_send_a_frame_is_heard_of_once():
+    """An adapter that carries reads of at most 16 bytes: the registers, but not 12
+    taxels."""
+    with faulty_skin(SMALL, lambda t: QUIET) as skin:
+        chip = skin.readers[1].slots[3].chip
+        bus = skin.readers[1].bus
+        transfer = bus.transfer
+
+        def limited(prepared):
+            address = prepared.messages[0].address
+            if len(prepared.buffer) > 16 and address == chip.address:
+                raise bus_error(errno.EIO, bus.name)
+            transfer(prepared)
+
+        bus.transfer = limited
+        heard = [status.state for _, status in changes(skin, 3.0)]
+    limit = sum(slot.spec.address == chip.address for slot in skin.readers[1].slots)
+    assert heard == ["down"] * limit
+
+
+def test_a_lost_bus_is_opened_again_and_again_and_both_changes_are_heard():
+    """As an adapter that is unplugged: the kernel wants its device closed."""
+    name = SMALL.buses[1].device
+    gone = Fault(code=errno.EIO, bus=name, during=(0.1, 4.0))
+    opened = []
+    heard = []
+    with faulty_skin(SMALL, lambda t: QUIET, faults=[gone]) as skin:
+        bus = skin.readers[1].bus
+        reopen = bus.reopen
+        bus.reopen = lambda: (opened.append(bus.now()), reopen())
+        for frame in Loop(skin, lasts_s=5.0).frames():
+            heard += [(round(frame.t, 3), *change) for change in skin.bus_changes()]
+    rests = np.diff([t for t in opened if t > 0.5])
+    assert rests == pytest.approx(LONGEST_REST_S, abs=0.011)
+    (lost_at, *lost), (back_at, *back) = heard
+    assert 0.1 <= lost_at < 0.2
+    assert lost == [name, True]
+    assert back == [name, False]
+    assert 4.0 <= back_at <= 4.0 + LONGEST_REST_S + 0.01
+
+
+def test_a_chip_that_another_program_kept_half_set_up_is_back_in_half_a_second():
+    """The mux turned away during its set-up, whose rows were read back from another
+    chip."""
+    fault = KINDS["another program's mux channel"]
+    at = {"first": 609, "every": 1000}
+    outcome = sweep("", SKINS["one bus"], fault, set_up=True, overhead_s=100e-6, **at)
+    assert outcome.met == 1
+    assert outcome.missing == 48
+    assert outcome.wrong == 0
+    assert outcome.back_s < BACK_S
