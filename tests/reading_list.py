@@ -12,7 +12,19 @@ from edge import demo
 from edge.wire.skin import file as skinfile
 
 ROOT = Path(__file__).parents[1]
-ROOMS = "edge commands bus chips skin touch model output tools fake".split()
+ROOMS = (
+    "edge",
+    "app",
+    "commands",
+    "bus",
+    "chips",
+    "skin",
+    "touch",
+    "record",
+    "decide",
+    "sinks",
+    "fake",
+)
 """In the order of the list; modules of `edge` itself come first."""
 PROGRAM = """
 import sys

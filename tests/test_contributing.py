@@ -8,11 +8,11 @@ import json
 import re
 import sys
 
-import edge.tools
 import numpy as np
 import pytest
 from pandas import DataFrame
 
+import edge.app.commands
 import train
 import train.importers
 from edge.app import cli
@@ -136,8 +136,8 @@ def run(arguments):
 
 
 def test_a_subcommand_is_a_module_and_its_name(monkeypatch, tmp_path, capsys):
-    module(edge.tools, monkeypatch, tmp_path, COMMAND)
-    monkeypatch.setitem(cli.COMMANDS, "toy", "edge.tools.toy")
+    module(edge.app.commands, monkeypatch, tmp_path, COMMAND)
+    monkeypatch.setitem(cli.COMMANDS, "toy", "edge.app.commands.toy")
     assert cli.main(["toy", "hello"]) == 0
     assert json.loads(capsys.readouterr().out) == {"event": "toy", "word": "hello"}
     with pytest.raises(SystemExit):

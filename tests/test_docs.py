@@ -76,7 +76,7 @@ def test_the_two_evenings_mend_a_mistake(tmp_path):
 NAMED = re.compile(rf"`({'|'.join(FLAGS)})`|\b(two|three|four|five|\d+) lines of\b")
 CLAIMS = {
     "evenings: task at least, and so it keeps all": "test_docs.py::test_the_two_evenings",
-    "how-it-decides: is then flagged `out_of_range`": "edge/test_answers.py::test_",
+    "how-it-decides: is then flagged `out_of_range`": "edge/decide/test_answers.py::test_",
     "how-it-decides: - **`unusual`**": "export/test_early_stopping.py::test_a_touch_unlike",
     "how-it-decides: - **`unknown`**": "export/test_early_stopping.py::test_an_unknown",
     "microcontroller: Without novelty nothing is": "export/test_c_code.py::test_what_does_not",
@@ -84,7 +84,7 @@ CLAIMS = {
     "microcontroller: but never flagged `short`": "export/test_c_code.py::test_the_demo_has",
     "recipes: it prints five lines of pandas": "train/importers/test_csv.py::test_the_lines_of",
     "recipes: at the full window, flagged `uncer": "export/test_early_stopping.py::test_a_task",
-    "recipes: Where none is certified at your": "edge/test_early.py::test_a_task_that_is_not",
+    "recipes: Where none is certified at your": "edge/decide/test_early.py::test_a_task_that",
     "recipes: - `unsure` flags a decision that": "export/test_early_stopping.py::test_a_stream",
     "recipes: `unusual` flags a touch unlike": "export/test_early_stopping.py::test_a_touch_un",
     "recipes: `unknown` flags a thing that": "export/test_early_stopping.py::test_an_unknown",

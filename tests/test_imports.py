@@ -73,7 +73,7 @@ def test_nothing_pickles(package):
 
 
 PACKAGES = ["edge", "train", "export"]
-ROOMS = "bus chips skin touch model classifier output commands tools"
+ROOMS = "wire touch record decide app"
 FRAME = [f"edge.{room}" for room in ROOMS.split()]
 """The way of one frame through `edge/`."""
 TOUCH = [
@@ -96,6 +96,8 @@ def test_a_stage_imports_only_earlier_ones(stage, later):
     path = ROOT.joinpath(*stage.split("."))
     passed_on = set() if stage in TOUCH else OF_A_FRAME
     for module in sorted(path.rglob("*.py")) or [path.with_suffix(".py")]:
+        if module.parent.name == "fake":  # plays recordings to the wire
+            continue
         for name in at_the_top(module) - passed_on:
             rooms = tuple(f"{room}." for room in later)
             assert not f"{name}.".startswith(rooms), f"{module}: {name}"
@@ -107,8 +109,8 @@ def test_a_stage_imports_only_earlier_ones(stage, later):
         ("import edge", ("edge.", "numpy")),
         ("import edge.app.cli, edge.decide.classifier", ("onnxruntime",)),
         (
-            "from edge import cli; cli.parser(['check'])",
-            ("edge.commands.r", "edge.tools"),
+            "from edge.app import cli; cli.parser(['check'])",
+            ("edge.app.commands.r", "edge.app.sinks"),
         ),
     ],
 )

@@ -46,7 +46,7 @@ def specified(module):
     package = ".".join(module.parent.parts)
     name = module.stem
     imported = rf"(from|import) {package}\.{name}\b|from {package} import .*\b{name}\b"
-    if module.parent.name in ("commands", "tools"):
+    if module.parent.name in ("commands", "app"):
         imported += rf"|main\(\[\"{name.strip('_')}\"|run\(\"{name}\"|edge\(\"{name}\""
     if module.parent.name == "effects":
         imported += rf"|\"{name}\"|\b{name}="

@@ -44,7 +44,7 @@ def test_mutants_without_a_name_are_refused(monkeypatch):
 def test_a_table_has_its_command_as_it_can_be_run_and_no_empty_part(
     monkeypatch, tmp_path
 ):
-    program = tables.ROOT / "tests" / "bench" / "soak.py"
+    program = tables.ROOT / "tests" / "checks" / "bench" / "soak.py"
     monkeypatch.setattr(tables, "FOLDER", tmp_path)
     monkeypatch.setattr("sys.argv", [str(program), "--data", "two words"])
     tables.write("soak", [[], [{"a": 1, "b": "x"}, {"a": 2, "b": "y"}], []])

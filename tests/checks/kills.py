@@ -34,7 +34,7 @@ from train.progress import bar
 EDGE = (sys.executable, "-m", "edge")
 TRAIN = (sys.executable, "-m", "train")
 EXPORT = (sys.executable, "-m", "export", "--quick", "--decision-points", "none")
-GOLDEN = Path(__file__).parent / "golden"
+GOLDEN = Path(__file__).parents[1] / "golden"
 PATIENCE_S = 120.0
 MOST_CHANGES = 4
 COPIES = 12

@@ -26,9 +26,15 @@ MUTMUT = (sys.executable, "-m", "mutmut")
 UNNOTICED = ("survived", "no tests")
 MOST_UNNOTICED = 1 / 50
 ROOMS = (
-    "edge.wire.bus. edge.wire.skin. edge.record.labels edge.record.saving edge.app.commands.label edge.app.sinks.page "
-    "edge.app.sinks.web export/c/"
-).split()
+    "edge.wire.bus.",
+    "edge.wire.skin.",
+    "edge.record.labels",
+    "edge.record.saving",
+    "edge.app.commands.label",
+    "edge.app.sinks.page",
+    "edge.app.sinks.web",
+    "export/c/",
+)
 """Begin the names of the mutants that are drawn from."""
 
 

@@ -116,7 +116,7 @@ def load(path: str | os.PathLike[str]) -> SkinFile:
 
 def shipped(name: str = "cody") -> Path:
     """Path of a skin file that comes with the package: `cody` or `mpr121`."""
-    return Path(__file__).parents[1] / "skins" / f"{name}.toml"
+    return Path(__file__).parents[2] / "skins" / f"{name}.toml"
 
 
 def parse(text: str, where: str = "skin") -> SkinFile:

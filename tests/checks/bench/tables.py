@@ -15,7 +15,7 @@ import sys
 from datetime import UTC, datetime
 from pathlib import Path
 
-ROOT = Path(__file__).parents[2]
+ROOT = Path(__file__).parents[3]
 FOLDER = ROOT / "docs" / "measured"
 MEASURED = (":!docs/measured", ":!docs/*.png")
 """What measuring changes, for git."""

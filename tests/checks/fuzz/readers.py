@@ -32,7 +32,7 @@ from tests.train.importers.test_importers import dsa
 from train.__main__ import main as train_main
 from train.simulate.scene import load as load_scene
 
-ROOT = Path(__file__).parents[2]
+ROOT = Path(__file__).parents[3]
 DEMO = ROOT / "edge" / "demo"
 MODEL = DEMO / "model.onnx"
 

@@ -1,0 +1,1 @@
+"""What is kept of touches: recordings, and the table of their labels."""

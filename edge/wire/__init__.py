@@ -1,0 +1,1 @@
+"""From the bus to frames: buses, chips, the skin that reads them, and their fakes."""
