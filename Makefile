@@ -231,7 +231,8 @@ wheel-test: $(DEV) wheel
 	$(BIN)/python -m pytest tests/board/test_wheel.py
 
 c-test: $(DEV)
-	$(BIN)/python -m pytest tests/export/test_c_code.py tests/export/test_c_graph.py -rs
+	$(BIN)/python -m pytest tests/export/test_c_code.py tests/export/test_c_graph.py \
+	  tests/export/test_skin_code.py -rs
 
 kernel-test: $(DEV)
 	$(BIN)/python -m pytest tests/board/test_kernel.py -rs --capture=tee-sys

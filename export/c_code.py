@@ -188,12 +188,7 @@ class Source:
             values[name] = literal(value)
             if isinstance(value, Sized):
                 values[f"{name}_count"] = str(len(value))
-        with ExitStack() as files:
-            for room in ROOMS.iterdir():
-                text = string.Template(room.read_text()).substitute(values)
-                file = files.enter_context(write_whole(folder / room.name))
-                file.write(text.encode())
-                file.flush()
+        write_rooms(ROOMS, folder, values)
 
     def _features(self) -> int:
         """The `ec_course` and the `ec_feature` of each feature, and the tables of the
@@ -401,6 +396,16 @@ class Source:
         }
         self.values |= {key: limit[-self._last :] for key, limit in limits.items()}
         self.values |= {"naming": naming, "calibrated": info.novelty is not None}
+
+
+def write_rooms(rooms: Path, folder: Path, values: Mapping[str, str]) -> None:
+    """Write all files of C of a folder with these values, whole or not at all."""
+    with ExitStack() as files:
+        for room in rooms.glob("*.[ch]"):
+            text = string.Template(room.read_text()).substitute(values)
+            file = files.enter_context(write_whole(folder / room.name))
+            file.write(text.encode())
+            file.flush()
 
 
 def checksum(model: Model) -> int:

@@ -24,6 +24,8 @@ from edge.record.recording import load
 from edge.record.saving import find, listed
 from edge.record.slips import counts_text
 from edge.touch.features import WINDOW_S
+from edge.touch.layout import for_device
+from edge.wire.skin import file as skinfile
 from edge.writing import check_writable
 from export.api import measure, save
 from train.choose.options import (
@@ -59,7 +61,7 @@ def parser() -> argparse.ArgumentParser:
     )
     option = top.add_argument
     text = ".npz recordings or folders"
-    option("--data", nargs="+", required=True, metavar="REC", help=text)
+    option("--data", nargs="+", metavar="REC", help=text)
     text = "folder (default: %(default)s)"
     option("--out", type=Path, default=Path("build"), help=text)
     text = "name of the model (default: that of the folder of the recordings)"
@@ -85,6 +87,8 @@ def parser() -> argparse.ArgumentParser:
     option("--compare", metavar="old.onnx", help=text)
     text = "folder for the model as C99 for a microcontroller"
     option("--c", type=Path, metavar="DIR", help=text)
+    text = "with --c: skin to write as C99 too; without --data it is written alone"
+    option("--skin", metavar="skin.toml", help=text)
     option(
         "--c-error",
         type=within(float, 1e-6, 1.0 - 1e-6),
@@ -101,6 +105,10 @@ def parser() -> argparse.ArgumentParser:
 def run(arguments: argparse.Namespace) -> int:
     """Fit, write and report."""
     _check_options(arguments)
+    if not arguments.data:
+        check_writable(arguments.c)
+        _write_skin(arguments)
+        return 0
     # What may fail does so before the work, which may take an hour.
     for folder in filter(None, (arguments.out, arguments.c)):
         check_writable(folder)
@@ -143,7 +151,26 @@ def _write_c(arguments: argparse.Namespace, model: Model) -> None:
     if arguments.c:
         from export.c_code import export
 
+        _write_skin(arguments, model)
         print(export(model, arguments.c, arguments.c_error, arguments.flash))
+
+
+def _write_skin(arguments: argparse.Namespace, model: Model | None = None) -> None:
+    """Write the skin in C, where that is asked for."""
+    if arguments.skin:
+        from export import skin_code
+
+        file = skinfile.load(arguments.skin)
+        counts = skin_code.UNREADABLE
+        if model is not None:
+            layout = model.info.layout
+            counts = for_device(layout, file.layout).threshold_counts
+            if file.layout.counts_per_newton != layout.counts_per_newton:
+                raise InputError(
+                    f"{arguments.skin}: counts_per_newton differs from that of the "
+                    "recordings, and C converts no counts; give the skin theirs"
+                )
+        print(skin_code.export(file, arguments.c, counts))
 
 
 def _check_options(arguments: argparse.Namespace) -> None:
@@ -153,8 +180,13 @@ def _check_options(arguments: argparse.Namespace) -> None:
             "--compare needs --test: only recordings that neither model was fitted on "
             "tell which is better"
         )
-    if (arguments.c_error or arguments.flash) and not arguments.c:
-        raise InputError("--c-error and --flash need --c DIR")
+    of_c = arguments.c_error or arguments.flash or arguments.skin
+    if of_c and not arguments.c:
+        raise InputError("--c-error, --flash and --skin need --c DIR")
+    if not (arguments.data or arguments.skin):
+        raise InputError(
+            "give --data REC, or --c DIR --skin skin.toml for the skin alone"
+        )
 
 
 def _check_apart(data: list[str], held_out: Sequence[Path]) -> None:

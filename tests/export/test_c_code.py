@@ -17,15 +17,14 @@ from edge.decide.info import Novelty, margin
 from edge.decide.model import Model
 from edge.elementary import logistic
 from edge.errors import InputError
-from edge.record.recording import Recording, load
+from edge.record.recording import load
 from edge.record.saving import save
 from edge.touch import measures
 from edge.touch.feature import KERNELS
 from edge.touch.kernels import KernelTable, channels_of
 from edge.touch.layout import SkinLayout
-from edge.wire.skin.decoder import Baseline
-from edge.wire.skin.file import Signal
-from export import c_code
+from edge.wire.skin import file as skinfile
+from export import c_code, skin_code
 from tests.conftest import ROOT, ended, export, in_a_row, touch
 from tests.edge.decide.test_engines import hostile
 from tests.export.microcontroller import machine
@@ -283,41 +282,29 @@ def test_every_feature_of_damaged_recordings_has_the_same_bits(
 
 @needs_gcc
 @pytest.mark.skipif(shutil.which("g++") is None, reason="there is no C++ compiler")
-def test_the_sketch_suits_the_header(tmp_path, monkeypatch):
+def test_the_sketch_suits_the_headers_with_a_model_and_without(tmp_path, monkeypatch):
     """Checked against the declarations of Arduino's core."""
     model = Model(demo.MODEL)
-    model.info = replace(model.info, layout=SkinLayout(1, 12))
+    skin = skinfile.load(skinfile.shipped("electrodes"))
+    model.info = replace(model.info, layout=SkinLayout(*skin.layout.shape))
     monkeypatch.setattr(c_code, "CompiledGraph", NoGraph)
-    c_code.export(model, tmp_path)
-    shutil.copy(ROOT / "tests" / "arduino.h", tmp_path / "Wire.h")
+    for name in ("Wire.h", "EEPROM.h"):
+        shutil.copy(ROOT / "tests" / "arduino.h", tmp_path / name)
+    skin_code.export(skin, tmp_path)
     sketch = ROOT / "docs" / "examples" / "firmware" / "decide" / "decide.ino"
-    command = ["g++", "-std=c++11", "-Wall", "-fsyntax-only", f"-I{tmp_path}", "-xc++"]
-    compiled = ended(*command, sketch)
-    assert compiled.returncode == 0, compiled.stderr
-
-
-@pytest.mark.slow
-@needs_gcc
-def test_the_baseline_follows_as_pythons(tmp_path):
-    rng = np.random.default_rng(9)
-    layout = Model(demo.MODEL).info.layout
-    walk = rng.integers(-4, 5, (80, *layout.shape)).cumsum(axis=0) + 30000
-    frames = np.clip(walk + np.arange(80)[:, None, None], 0, 65535).astype(np.uint16)
-    valid = rng.random(frames.shape) < 0.9
-    recording = Recording(np.arange(80.0), frames, valid=valid)
-    signal = Signal(
-        drift_counts_per_s=300 / 4096, drift_limit_counts=20, dead_band_counts=3
-    )
-    baseline = Baseline(signal, 1.0, frames[0].ravel(), sign=-1)
-    expected = []
-    for raw, readable in zip(frames, valid, strict=True):
-        expected.append(baseline.above(raw.ravel()))
-        baseline.follow(raw.ravel(), readable.ravel())
-    c_code.export(Model(demo.MODEL), tmp_path)
-    question = machine.about_recording(machine.BASELINE, recording)
-    answer = machine.ask(machine.compiled(tmp_path), tmp_path, [question])
-    assert answer.tolist() == np.concatenate(expected).tolist()
-    assert np.unique(answer).size > 10
+    command = [
+        "g++",
+        "-std=c++11",
+        "-Wall",
+        "-Werror",
+        "-fsyntax-only",
+        f"-I{tmp_path}",
+        "-xc++",
+    ]
+    for write in (lambda: None, lambda: c_code.export(model, tmp_path)):
+        write()
+        compiled = ended(*command, sketch)
+        assert compiled.returncode == 0, compiled.stderr
 
 
 RATES = (50, 100, 125, 200, 500, 1000)

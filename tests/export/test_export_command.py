@@ -229,7 +229,7 @@ def test_a_former_model_in_the_same_place_is_compared_as_it_was(
         (["--test", "loop"], "loop: cannot be read: Too many levels of symbolic links"),
         (["--test", "x.npz", "--compare", "old.onnx"], "old.onnx: no such model"),
         (["--compare", "old.onnx"], "--compare needs --test"),
-        (["--flash", "512"], "--c-error and --flash need --c"),
+        (["--flash", "512"], "--c-error, --flash and --skin need --c"),
     ],
 )
 def test_held_out_recordings_and_a_former_model_are_checked_before_any_work(
