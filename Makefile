@@ -266,7 +266,7 @@ accuracy: $(PEERS)/.ready
 	$(PEERS)/bin/python -m tests.checks.bench.accuracy $(if $(GRASPS),--grasps "$(GRASPS)")
 
 peers-test: $(PEERS)/.ready
-	$(PEERS)/bin/python -m pytest tests/edge/touch/test_kernels.py -k aeon -rs
+	$(PEERS)/bin/python -m pytest tests/edge/features/test_kernels.py -k aeon -rs
 
 stopping: $(DEV)
 	$(BIN)/python -m tests.checks.bench.stopping --data $(STOPPED) $(STOPPING)

@@ -15,18 +15,19 @@ from pathlib import Path
 import numpy as np
 
 from edge.arrays import Array, Floats
+from edge.decide.doubts import GAP_S, PERIODS
 from edge.decide.early import stopping_rules
 from edge.decide.info import ModelInfo, Novelty, Remoteness, StoppingRule
 from edge.decide.model import Model
 from edge.elementary import log, logistic, sin
 from edge.errors import InputError
-from edge.touch import measures, transforms
-from edge.touch.cells import KERNEL_CELLS, Cells
+from edge.features import names as measures
+from edge.features import transforms
+from edge.features.cells import KERNEL_CELLS, Cells
+from edge.features.kernels import BIASES, CONVOLUTIONS, KernelTable, mixes
+from edge.features.zones import Zones
 from edge.touch.contact import feature_types
-from edge.touch.doubts import GAP_S, PERIODS
-from edge.touch.kernels import BIASES, CONVOLUTIONS, KernelTable, mixes
 from edge.touch.layout import SkinLayout
-from edge.touch.zones import Zones
 from edge.writing import write_whole
 from export.c_graph import CompiledGraph, Step
 

@@ -76,9 +76,7 @@ PACKAGES = ["edge", "train", "export"]
 ROOMS = "wire touch record decide app"
 FRAME = [f"edge.{room}" for room in ROOMS.split()]
 """The way of one frame through `edge/`."""
-TOUCH = [
-    f"edge.touch.{s}" for s in "frame layout active measures track features".split()
-]
+TOUCH = [f"edge.touch.{s}" for s in "frame layout region track".split()]
 """The way of a touch: a frame becomes a region, a contact, a vector."""
 FITTING = [f"train.{room}" for room in "data model choose fitting report".split()]
 """The rooms of the workstation, from the bottom."""

@@ -10,8 +10,8 @@ import numpy as np
 
 from edge.arrays import Floats
 from edge.errors import InputError
+from edge.features.vector import WINDOW_S
 from edge.record.slips import slips, too_few
-from edge.touch.features import WINDOW_S
 from train.choose.candidates import Candidate
 from train.choose.decision_points import decision_points, has_early_points
 from train.choose.options import FitOptions, Loaded, trials_of

@@ -12,14 +12,14 @@ from typing import TYPE_CHECKING
 from edge.arrays import Floats
 from edge.elementary import log, logistic
 from edge.errors import InputError
-from edge.touch.features import feature_vector, widths
+from edge.features.vector import feature_vector, widths
 from edge.touch.layout import SkinLayout, for_device
 from edge.touch.track import ContactTracker
 
 if TYPE_CHECKING:
+    from edge.features.kernels import KernelTable
     from edge.touch.arm import Chain
     from edge.touch.contact import FeatureSeries
-    from edge.touch.kernels import KernelTable
 
 METADATA_KEY = "edge-classify"
 FORMAT = 9

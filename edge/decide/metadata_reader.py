@@ -15,8 +15,8 @@ from edge.decide.info import (
     Task,
 )
 from edge.errors import InputError, about
+from edge.features.feature import KERNELS
 from edge.touch.contact import feature_types
-from edge.touch.feature import KERNELS
 from edge.touch.frame import ONSETS
 from edge.touch.layout import SkinLayout
 
@@ -74,7 +74,7 @@ def _read(meta: ConfigTable) -> ModelInfo:
         novelty = Novelty(typical, table.numbers("limits", count, low=0.0))
     kernels = {}
     if not KERNELS.keys().isdisjoint(names):
-        from edge.touch.kernels import read_tables  # few models have any
+        from edge.features.kernels import read_tables  # few models have any
 
         kernels = read_tables(meta.table("kernels"), names, layout)
     info = ModelInfo(

@@ -14,16 +14,16 @@ from numpy.typing import NDArray
 from edge.arrays import Booleans, Counts, Floats, Integers
 from edge.elementary import length
 from edge.errors import InputError
-from edge.touch.active import ActiveTaxels, Region
-from edge.touch.feature import OF_CELLS, OF_PAPER, PAPER, Feature
+from edge.features.feature import OF_CELLS, OF_PAPER, PAPER, Feature
 from edge.touch.frame import Frame
 from edge.touch.layout import SkinLayout
+from edge.touch.region import ActiveTaxels, Region
 
 if TYPE_CHECKING:
+    from edge.features.cells import Cells
+    from edge.features.zones import Zones
     from edge.touch.arm import Chain, Vector
-    from edge.touch.cells import Cells
     from edge.touch.joint_angles import JointAngles
-    from edge.touch.zones import Zones
 
 CLOCK_ROUNDING_S = 1e-6
 """Shorter than a frame, and longer than the rounding of a clock that counts 1e9
@@ -51,15 +51,15 @@ class FeatureSeries:
         layout: the skin, with its thresholds.
         ended: the contact ended with the last frame.
         speed: of the joints before onset, see `Contact`.
-        zones: {zone: (n, 8)} whole numbers of each zone, see `edge.touch.zones`; 10
+        zones: {zone: (n, 8)} whole numbers of each zone, see `edge.features.zones`; 10
             with those of its shear.
         force_motion: (n,) as `motion`, of the force-weighted centroid, or None.
-        taxel_force: (n, cells) value of each cell of the skin (`edge.touch.cells.Cells`),
+        taxel_force: (n, cells) value of each cell of the skin (`edge.features.cells.Cells`),
             or None.
         taxel_kernels: (n, cells) likewise, of the larger cells that kernels take, or
             None.
         taxel_shear: (n, 2 * cells) likewise, of the shear of the same cells
-            (`edge.touch.cells.ShearCells`), or None.
+            (`edge.features.cells.ShearCells`), or None.
         joints: (n, dof) joint angles in radians, NaN where they were not known, or
             None.
     """
@@ -120,7 +120,7 @@ def feature_types(names: Sequence[str]) -> tuple[Feature, ...]:
         raise InputError(f"the feature {min(twice)} is named twice; leave one out")
     if OF_PAPER.keys() >= set(names):
         return tuple(OF_PAPER[name] for name in names)
-    from edge.touch.measures import feature  # many models have the paper's alone
+    from edge.features.names import feature  # many models have the paper's alone
 
     return tuple(map(feature, names))
 
@@ -151,13 +151,13 @@ class Measurer:
         self.force_motion = not quantities.isdisjoint(("force_motion", "stiffness"))
         self.zones: Zones | None = None
         if any(feature.zones for feature in types):
-            from edge.touch.zones import Zones
+            from edge.features.zones import Zones
 
             self.zones = Zones(layout, types)
         self.joints: JointAngles | None = None
         self.readers: dict[str, Cells | JointAngles] = {}
         if not quantities.isdisjoint(OF_CELLS):
-            from edge.touch.cells import cells_for
+            from edge.features.cells import cells_for
 
             self.readers.update(cells_for(layout, quantities))
         if joints and any(feature.of_joints for feature in types):

@@ -3,22 +3,24 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
+from operator import itemgetter
 from typing import TYPE_CHECKING
 
 from edge.errors import InputError
-from edge.touch.active import ActiveTaxels, Region
+from edge.features.feature import PAPER
 from edge.touch.contact import (
     CLOCK_ROUNDING_S,
     Contact,
+    FeatureSeries,
     Measurer,
     region_time,
     released,
 )
-from edge.touch.feature import PAPER
 from edge.touch.frame import Frame
 from edge.touch.layout import SkinLayout
+from edge.touch.region import ActiveTaxels, Region
 
 if TYPE_CHECKING:
     from edge.touch.arm import Chain
@@ -85,7 +87,7 @@ class ContactTracker:
             horizon_s: seconds from onset after which a contact's series takes in no
                 more.
             features: names of the features that the series is for (see
-                `edge.touch.measures`); nothing else is measured.
+                `edge.features.names`); nothing else is measured.
             joints: joint angles of a frame, where a feature is made of them.
             max_contacts: how many are followed at once, the largest first.
 
@@ -195,8 +197,6 @@ class ContactTracker:
         """The regions to follow, the largest first, and {contact: the region that
         continues it}."""
         if self.max_contacts > 1:
-            from edge.touch.several import shared  # few follow more than one
-
             return active.regions, shared(self.contacts, active.regions)
         former = self.contacts[0].region if self.contacts else None
         largest = active.largest(former)
@@ -255,3 +255,51 @@ class ContactTracker:
         self._t = frame.t
         if self._measurer.joints is not None:
             self._measurer.joints.watch(frame)
+
+
+def shared(
+    contacts: Sequence[Contact], regions: Sequence[Region]
+) -> dict[Contact, Region]:
+    """{contact: the region that continues it}.
+
+    Most taxels in common come first, then the older contact, then the larger region.
+
+    Args:
+        contacts: the oldest first.
+        regions: the largest first.
+    """
+    pairs = []
+    for contact in contacts:
+        for region in regions:
+            former = contact.region
+            if former is not None and former.touches(region):
+                common = (former.bits & region.bits).bit_count()
+                pairs.append((common, contact, region))
+    shares: dict[Contact, Region] = {}
+    for _, contact, region in sorted(pairs, key=itemgetter(0), reverse=True):
+        if contact not in shares and region not in shares.values():
+            shares[contact] = region
+    return shares
+
+
+def first_contact(
+    frames: Iterable[Frame], tracker: ContactTracker
+) -> tuple[float, FeatureSeries] | None:
+    """Onset in seconds and series of the first contact, or None without contact.
+
+    Frames after its end, or beyond the tracker's horizon, are not read.
+
+    Args:
+        frames: in the order of time; a `Recording` is such a stream.
+        tracker: fresh.
+    """
+    first: Contact | None = None
+    for frame in frames:
+        contacts = tracker.push(frame)
+        if first is None and contacts:
+            first = contacts[0]
+        if first is not None and (
+            first.ended or frame.t - first.onset_s >= tracker.horizon_s
+        ):
+            break
+    return None if first is None else (first.onset_s, first.series())

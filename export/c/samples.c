@@ -1,5 +1,5 @@
-/* A contact's frames to values at sample times, as they come: edge/touch/contact.py, features.py,
-   zones.py, kernels.py.
+/* A contact's frames to values at sample times, as they come: edge/touch/contact.py,
+   edge/features/vector.py, zones.py, kernels.py.
 
    Frames are not kept: between two frames in which a value is known, it is interpolated to the sample
    times that lie there. What follows a lift-off is written as if the contact were over, and written

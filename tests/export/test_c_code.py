@@ -17,11 +17,11 @@ from edge.decide.info import Novelty, margin
 from edge.decide.model import Model
 from edge.elementary import logistic
 from edge.errors import InputError
+from edge.features import names as measures
+from edge.features.feature import KERNELS
+from edge.features.kernels import KernelTable, channels_of
 from edge.record.recording import Recording, load
 from edge.record.saving import save
-from edge.touch import measures
-from edge.touch.feature import KERNELS
-from edge.touch.kernels import KernelTable, channels_of
 from edge.touch.layout import SkinLayout
 from edge.wire.skin.decoder import Baseline
 from edge.wire.skin.file import Signal

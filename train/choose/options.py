@@ -7,8 +7,8 @@ from functools import partial
 from joblib import cpu_count
 
 from edge.errors import InputError
+from edge.features.vector import SAMPLES
 from edge.touch.arm import Chain
-from edge.touch.features import SAMPLES
 from train.choose.candidates import CHOOSE_ALL, Fixed, candidates, features_of
 from train.choose.choose import SECOND_WORTH, Choosing
 from train.data import pieces, thresholds

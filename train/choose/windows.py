@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from edge.touch.features import WINDOW_S
+from edge.features.vector import WINDOW_S
 
 LONG_TOUCHES = 2.0
 """Longer windows are tried where half of the touches last so many windows."""

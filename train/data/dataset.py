@@ -17,17 +17,17 @@ from joblib import delayed
 
 from edge.arrays import Booleans, Floats
 from edge.errors import InputError
+from edge.features import names as measures
+from edge.features.feature import KERNELS, Feature
+from edge.features.kernels import KernelTable, kernel_channels
+from edge.features.vector import FEATURES, SAMPLES, WINDOW_S, feature_vector, widths
 from edge.files import read_bytes
 from edge.record.labels import read_table
 from edge.record.npz import LARGEST_BYTES
 from edge.record.recording import Recording, load
 from edge.record.saving import find
-from edge.touch import measures
 from edge.touch.arm import Chain
 from edge.touch.contact import feature_types
-from edge.touch.feature import KERNELS, Feature
-from edge.touch.features import FEATURES, SAMPLES, WINDOW_S, feature_vector, widths
-from edge.touch.kernels import KernelTable, kernel_channels
 from edge.touch.layout import SkinLayout
 from train.data.arms import arm_of, joint_angles
 from train.data.contacts import (
@@ -160,7 +160,7 @@ class DataSet:
         names: Sequence[str] | None = None,
     ) -> Floats:
         """(n, features * samples) feature vectors (see
-        `edge.touch.features.feature_vector`).
+        `edge.features.vector.feature_vector`).
 
         Args:
             window_s: seconds from onset.
@@ -260,7 +260,7 @@ class Measurement:
     """The measures that are taken of each contact.
 
     Attributes:
-        features: names of the features (see `edge.touch.measures`).
+        features: names of the features (see `edge.features.names`).
         horizon_s: seconds from onset that are kept of each contact.
         threshold: counts above which a taxel is in contact; those of the first
             recording that is not simulated where None. All share it, as the board does

@@ -36,7 +36,7 @@ roots. Forces spread over decades; their square roots lie evenly, as those of co
 | `slant` | taxel^2 | and times row times column |
 
 `taxels`: every taxel in its place, or cells of several where the skin is large
-(`edge.touch.cells.Cells`). `sqrt_taxels`: the same of their square roots.
+(`edge.features.cells.Cells`). `sqrt_taxels`: the same of their square roots.
 
 | feature, of each cell | unit | from |
 |---|---|---|
@@ -45,9 +45,9 @@ roots. Forces spread over decades; their square roots lie evenly, as those of co
 | `taxel_force_roughness` | newton (count) | its mean change from sample to sample |
 
 `kernels`: the share of the window in which kernels of nine samples, applied to sums of
-the skin's cells, lie above values that training gave (`edge.touch.kernels`).
+the skin's cells, lie above values that training gave (`edge.features.kernels`).
 `zone_kernels`: the same of the eight whole numbers of each zone
-(`edge.touch.zones.ZONE_WIDTH`), which goes with `moments`.
+(`edge.features.zones.ZONE_WIDTH`), which goes with `moments`.
 
 | feature | unit | from |
 |---|---|---|
@@ -85,9 +85,9 @@ of the normal one. It nears the coefficient of friction before a contact slides.
 
 from collections.abc import Sequence
 
-from edge.touch.feature import KERNELS, PAPER, Feature
+from edge.features.feature import KERNELS, PAPER, Feature
+from edge.features.names import OF_SHEAR, QUANTITIES
 from edge.touch.layout import SkinLayout
-from edge.touch.measures import OF_SHEAR, QUANTITIES
 
 FORCES = (
     "max_force",
@@ -143,7 +143,7 @@ SETS: dict[str, tuple[str, ...]] = {
     ),
     "taxel_shear": ("sqrt_taxel_shear@10",),
 }
-"""{set: names of its features, see `edge.touch.measures`}."""
+"""{set: names of its features, see `edge.features.names`}."""
 
 
 def expand(names: Sequence[str]) -> tuple[str, ...]:

@@ -35,7 +35,7 @@ from scipy.linalg import eigh
 from scipy.spatial.distance import cdist
 
 from edge.arrays import Booleans, Floats, Integers
-from edge.touch.measures import feature
+from edge.features.names import feature
 from train.data.vectors import Strings, Vectors
 from train.threads import in_processes, single_thread
 

@@ -7,8 +7,8 @@ from numpy.typing import NDArray
 
 from edge.arrays import Booleans, Floats, Integers
 from edge.errors import InputError
-from edge.touch.features import FEATURES
-from edge.touch.measures import feature
+from edge.features.names import feature
+from edge.features.vector import FEATURES
 from train.data.vectors import widths_of
 
 OF_PAPER = ("none", "I", "II", "III", "IV", "V")

@@ -11,7 +11,7 @@ from sklearn.neighbors import NearestNeighbors
 from edge.app.commands.info import doubt
 from edge.arrays import Floats
 from edge.errors import printable
-from edge.touch import measures
+from edge.features import names as measures
 from train.choose.protocols import HALVINGS
 from train.choose.settings import Chosen
 from train.data import outliers

@@ -10,7 +10,7 @@ from sklearn.ensemble import ExtraTreesClassifier
 from sklearn.model_selection import PredefinedSplit, cross_val_predict
 
 from edge.arrays import Floats, Integers
-from edge.touch.features import FEATURES, SAMPLES, WINDOW_S
+from edge.features.vector import FEATURES, SAMPLES, WINDOW_S
 from train.choose.crossval import MAX_COMPONENTS, MAX_K
 from train.choose.evaluate import Result
 from train.choose.search import SearchGrid

@@ -9,9 +9,9 @@ from typing import Any
 
 import numpy as np
 
-from edge.touch.features import WINDOW_S
+from edge.features.names import OF_SHEAR, feature
+from edge.features.vector import WINDOW_S
 from edge.touch.layout import SkinLayout
-from edge.touch.measures import OF_SHEAR, feature
 from train.choose.settings import Chosen
 from train.data.dataset import DataSet, Recordings
 from train.data.folds import finest, stratified_folds

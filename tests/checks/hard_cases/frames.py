@@ -8,7 +8,7 @@ import numpy as np
 from hypothesis import strategies as st
 from mpmath import mpf
 
-from edge.touch.features import feature_vector
+from edge.features.vector import feature_vector
 from edge.touch.frame import Frame
 from edge.touch.layout import SkinLayout
 from edge.touch.track import ContactTracker

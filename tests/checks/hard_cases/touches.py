@@ -3,14 +3,14 @@
 import numpy as np
 from hypothesis import strategies as st
 
+from edge.features.kernels import SAMPLES, KernelTable, shares
+from edge.features.zones import quantities
 from edge.touch.frame import Frame
-from edge.touch.kernels import SAMPLES, KernelTable, shares
 from edge.touch.layout import SkinLayout
-from edge.touch.zones import quantities
 from tests.checks.hard_cases.cases import SEEDS, Case, Ladder
+from tests.edge.features.test_kernels import by_hand
+from tests.edge.features.test_names import moments
 from tests.edge.touch.pressed import zones_of
-from tests.edge.touch.test_kernels import by_hand
-from tests.edge.touch.test_measures import moments
 
 
 def kernels_error(bits, seed):

@@ -3,11 +3,11 @@ numbers of a frame's zones."""
 
 import numpy as np
 
-from edge.touch.active import ActiveTaxels
+from edge.features.zones import Zones
 from edge.touch.contact import feature_types
 from edge.touch.frame import Frame
+from edge.touch.region import ActiveTaxels
 from edge.touch.track import DEBOUNCE, ContactTracker
-from edge.touch.zones import Zones
 
 
 def pressed(layout, t, taxels, **more):

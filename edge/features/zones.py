@@ -9,12 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from edge.arrays import Array, Floats, Integers
-from edge.touch.active import ActiveTaxels, Region
-from edge.touch.feature import Feature
+from edge.features.feature import Feature
+from edge.features.names import SHEAR, ZONES
+from edge.features.transforms import force_floor, length_floor
 from edge.touch.grid import best_cut
 from edge.touch.layout import SkinLayout
-from edge.touch.measures import SHEAR, ZONES
-from edge.touch.transforms import force_floor, length_floor
+from edge.touch.region import ActiveTaxels, Region
 
 ZONE_WIDTH = 8
 """Whole numbers of a zone, in this order: largest count, taxels, sum of counts, and the
@@ -36,7 +36,7 @@ class Zones:
         self.width = ZONE_WIDTH
         self._shear_sums: Callable[..., list[int]] | None = None
         if any(feature.quantity in SHEAR for feature in features):
-            from edge.touch import shear  # few skins have three axes
+            from edge.features import shear  # few skins have three axes
 
             self.width += shear.WIDTH
             self._shear_sums = shear.sums
@@ -110,7 +110,7 @@ def quantities(sums: Integers, layout: SkinLayout) -> dict[str, Array]:
     The centroid of an empty zone is NaN, everything else of it 0.
     """
     if sums.shape[1] > ZONE_WIDTH:
-        from edge.touch import shear  # few skins have three axes
+        from edge.features import shear  # few skins have three axes
 
         return shear.quantities(sums, layout) | quantities(sums[:, :ZONE_WIDTH], layout)
     scale = layout.counts_per_newton or 1.0

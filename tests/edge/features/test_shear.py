@@ -10,12 +10,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from edge.errors import InputError
-from edge.touch import shear
-from edge.touch.features import feature_vector
+from edge.features import shear
+from edge.features.names import SHEAR, ZONES
+from edge.features.vector import feature_vector
+from edge.features.zones import ZONE_WIDTH
 from edge.touch.frame import Frame
 from edge.touch.layout import SkinLayout
-from edge.touch.measures import SHEAR, ZONES
-from edge.touch.zones import ZONE_WIDTH
 from tests.edge.touch.pressed import active_of, followed, zones_of
 
 THRESHOLD = 10

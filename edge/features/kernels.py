@@ -23,12 +23,12 @@ from numpy.typing import NDArray
 from edge.arrays import Booleans, Floats, Integers
 from edge.config import ConfigTable
 from edge.errors import InputError
-from edge.touch.cells import KERNEL_CELLS, Cells
+from edge.features.cells import KERNEL_CELLS, Cells
+from edge.features.feature import KERNELS, not_measured
+from edge.features.names import ZONES
+from edge.features.zones import ZONE_WIDTH
 from edge.touch.contact import CLOCK_ROUNDING_S, FeatureSeries
-from edge.touch.feature import KERNELS, not_measured
 from edge.touch.layout import SkinLayout
-from edge.touch.measures import ZONES
-from edge.touch.zones import ZONE_WIDTH
 
 SAMPLES = 120
 """Times of the window at which a channel is taken: 100 a second in the usual window.

@@ -9,9 +9,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from edge.errors import InputError
+from edge.features.vector import feature_vector
 from edge.touch.arm import Chain
 from edge.touch.contact import FeatureSeries
-from edge.touch.features import feature_vector
 from edge.touch.layout import SkinLayout
 from tests.conftest import python
 from tests.edge.touch.pressed import followed, pressed
@@ -154,9 +154,9 @@ BITS = """
 import hashlib
 import edge
 from edge import demo
-from edge.touch import measures
-from edge.touch.features import feature_vector
-from edge.touch.first_contact import first_contact
+from edge.features import names as measures
+from edge.features.vector import feature_vector
+from edge.touch.track import first_contact
 from edge.touch.track import ContactTracker
 
 names = [n for n in measures.names() if "kernels" not in n and "shear" not in n]

@@ -18,7 +18,7 @@ import re
 from functools import lru_cache
 
 from edge.errors import InputError
-from edge.touch.feature import KERNELS, OF_CELLS, PAPER, Feature
+from edge.features.feature import KERNELS, OF_CELLS, PAPER, Feature
 
 ZONES = ("contact", "skin", "left", "right")
 QUANTITIES = tuple(
@@ -52,7 +52,7 @@ WIDE = (*OF_CELLS, *KERNELS, "joint_change", "joint_angle")
 """Quantities of many values: one for each cell of the skin, kernel or
 joint."""
 SHEAR = ("shear_along", "shear_around", "shear_size", "shear_ratio")
-"""Quantities of a zone of a skin of three axes, see `edge.touch.shear`."""
+"""Quantities of a zone of a skin of three axes, see `edge.features.shear`."""
 OF_SHEAR = (*SHEAR, "taxel_shear")
 """All quantities of such a skin alone."""
 SIGNED = frozenset(
@@ -62,7 +62,7 @@ SIGNED = frozenset(
 
 TRANSFORMS = ("log", "sqrt", "relative")
 """Transforms of a feature's value: the logarithm of the value plus a floor (see
-`edge.touch.features`), the square root with the value's sign, and the value over its
+`edge.features.vector`), the square root with the value's sign, and the value over its
 largest magnitude within the window."""
 SUMMARIES = ("rate", "mean", "deviation", "roughness")
 """Summaries of a feature's course. The rate is a course itself, of the change a second.

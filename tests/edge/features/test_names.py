@@ -13,14 +13,14 @@ from hypothesis import strategies as st
 
 from edge.decide.verify import integers_of
 from edge.errors import InputError
-from edge.touch.cells import Cells
+from edge.features.cells import Cells
+from edge.features.feature import PAPER
+from edge.features.names import ZONES, names
+from edge.features.vector import feature_vector
+from edge.features.zones import quantities
 from edge.touch.contact import feature_types
-from edge.touch.feature import PAPER
-from edge.touch.features import feature_vector
 from edge.touch.frame import Frame
 from edge.touch.layout import SkinLayout
-from edge.touch.measures import ZONES, names
-from edge.touch.zones import quantities
 from tests.edge.touch.pressed import active_of, followed, pressed, zones_of
 
 FLAT = SkinLayout(5, 7, threshold_counts=10, onset_counts=10, counts_per_newton=100.0)
@@ -157,7 +157,7 @@ def test_moments_are_those_of_exact_arithmetic(seed, density):
     above = counts > 10
     exact = moments(np.c_[np.argwhere(above), counts[above]].tolist())
     exact["force"] = counts[above].sum() / 100
-    # The determinant of a thin contact cancels: see `edge.touch.features`.
+    # The determinant of a thin contact cancels: see `edge.features.vector`.
     width = pytest.approx(float(exact.pop("width")), abs=7 * 2.0**-25)
     assert value(FLAT, counts, "skin_width") == width
     for quantity, truth in exact.items():

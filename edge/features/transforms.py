@@ -6,7 +6,7 @@ import numpy as np
 
 from edge.arrays import Array, Floats
 from edge.elementary import log
-from edge.touch.feature import Feature
+from edge.features.feature import Feature
 from edge.touch.layout import SkinLayout
 
 FORCES = ("max_force", "force", "pressure", "taxel_force", "shear_size")

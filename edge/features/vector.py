@@ -13,12 +13,12 @@ import numpy as np
 
 from edge.arrays import Array, Floats
 from edge.errors import InputError
+from edge.features.feature import OF_CELLS, PAPER, Feature, not_measured
 from edge.touch.contact import FeatureSeries, feature_types
-from edge.touch.feature import OF_CELLS, PAPER, Feature, not_measured
 from edge.touch.layout import SkinLayout
 
 if TYPE_CHECKING:
-    from edge.touch.kernels import KernelTable
+    from edge.features.kernels import KernelTable
 
 FEATURES = PAPER
 SAMPLES = 40
@@ -53,7 +53,7 @@ def widths(
         if feature.of_joints:
             length *= joints
         elif feature.wide and not feature.kernels:
-            from edge.touch.cells import Cells
+            from edge.features.cells import Cells
 
             length *= Cells(layout).count * OF_CELLS[feature.quantity]
         lengths.append(length)
@@ -71,7 +71,7 @@ def feature_vector(
 
     >>> import edge
     >>> from edge import demo
-    >>> from edge.touch.first_contact import first_contact
+    >>> from edge.touch.track import first_contact
     >>> from edge.touch.track import ContactTracker
     >>> recording = edge.load(demo.FOLDER / "pillow-movable.npz")
     >>> onset_s, series = first_contact(recording, ContactTracker(recording.layout))
@@ -98,7 +98,7 @@ def feature_vector(
         series: the contact.
         window_s: seconds from onset, above 0.
         samples: times per feature, at least 2.
-        features: names, see `edge.touch.measures`; the series must have been measured
+        features: names, see `edge.features.names`; the series must have been measured
             for them.
         tables: {feature: its table} of those that are made of kernels.
 
@@ -147,7 +147,7 @@ class _Course:
 
     @cached_property
     def _zones(self) -> dict[str, dict[str, Array]]:
-        from edge.touch import zones  # the paper's features need none
+        from edge.features import zones  # the paper's features need none
 
         series = self.series
         return zones.quantities_of(series.zones, series.force_motion, series.layout)
@@ -156,7 +156,7 @@ class _Course:
         """Values of features of one kind, one after another."""
         first = group[0]
         if first.kernels:
-            from edge.touch import kernels  # few models have convolution features
+            from edge.features import kernels  # few models have convolution features
 
             return kernels.shares_of(
                 self.series,
@@ -168,7 +168,7 @@ class _Course:
         step = self.window_s / (samples - 1)
         values = self._sampled(group, np.arange(samples, dtype=np.float64) * step)
         if first.transforms or first.summary:
-            from edge.touch import transforms  # the paper's features have none
+            from edge.features import transforms  # the paper's features have none
 
             values = transforms.transformed(values, group, self.series.layout)
             values = transforms.summarised(values, first.summary, step)

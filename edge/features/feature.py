@@ -5,8 +5,8 @@ from dataclasses import dataclass
 from edge.errors import InputError
 
 KERNELS = {"taxel_kernels": 1008, "zone_kernels": 504}
-"""Quantities that kernels make (`edge.touch.kernels`), and how many values each has.
-They are applied to the skin's cells, at most `edge.touch.cells.KERNEL_CELLS`, and to
+"""Quantities that kernels make (`edge.features.kernels`), and how many values each has.
+They are applied to the skin's cells, at most `edge.features.cells.KERNEL_CELLS`, and to
 the whole numbers of all zones."""
 
 
@@ -20,7 +20,7 @@ class Feature:
 
     Attributes:
         name: users select it by this name.
-        zone: one of `edge.touch.measures.ZONES`, or `arm`.
+        zone: one of `edge.features.names.ZONES`, or `arm`.
         quantity: one of `QUANTITIES` or `SHEAR` there, or of those of `ALONE`.
         transforms: of its value, in the order in which they are applied.
         summary: one of `SUMMARIES`, or empty for its course.
