@@ -21,8 +21,9 @@ from edge.app.trial_options import add_arm, open_arm
 from edge.decide.classifier import suited
 from edge.decide.model import Model
 from edge.errors import InputError
-from edge.features import names as measures
+from edge.features.quantities import ALONE, OF_ZONES
 from edge.features.vector import WINDOW_S
+from edge.features.zones import ZONES
 from edge.record.labels import read_table
 from edge.record.recording import load
 from edge.record.saving import find, listed
@@ -97,8 +98,8 @@ OPTIONS: dict[str, dict[str, Any]] = {
         "nargs": "+",
         "metavar": "NAME",
         "help": f"the features to measure, instead of a choice: sets ({', '.join(SETS)}) and "
-        f"single features, ZONE_QUANTITY of {', '.join(measures.ZONES)} and "
-        f"{', '.join(measures.QUANTITIES)}, or {', '.join(measures.ALONE)}",
+        f"single features, ZONE_QUANTITY of {', '.join(ZONES)} and "
+        f"{', '.join(OF_ZONES)}, or {', '.join(ALONE)}",
     },
     "--projection": {
         "choices": KINDS,

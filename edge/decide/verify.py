@@ -34,7 +34,7 @@ import numpy as np
 from edge.arrays import Array, Floats, Integers
 from edge.decide.model import Model
 from edge.errors import InputError
-from edge.features.feature import OF_CELLS
+from edge.features.quantities import OF_CELLS
 from edge.files import parsing
 from edge.record.npz import load_arrays, load_meta
 from edge.record.recording import Recording

@@ -24,9 +24,9 @@ from edge.arrays import Booleans, Floats, Integers
 from edge.config import ConfigTable
 from edge.errors import InputError
 from edge.features.cells import KERNEL_CELLS, Cells
-from edge.features.feature import KERNELS, not_measured
-from edge.features.names import ZONES
-from edge.features.zones import ZONE_WIDTH
+from edge.features.names import not_measured
+from edge.features.quantities import KERNELS
+from edge.features.zones import ZONE_WIDTH, ZONES
 from edge.touch.contact import CLOCK_ROUNDING_S, FeatureSeries
 from edge.touch.layout import SkinLayout
 

@@ -1,65 +1,29 @@
 """Features of a contact by name.
 
-A feature's name is a zone and a quantity, such as `skin_force` or `left_width`; the
-paper's three features keep their own names. Transforms stand before the name (`log_`,
-`sqrt_`, `relative_`; the one next to the name is applied first). A summary of its
-course stands after it (`_rate`, `_mean`, `_deviation`, `_roughness`):
+A feature's name is a zone and a quantity (`edge.features.quantities`), such as
+`skin_force` or `left_width`, or that of a quantity alone. Transforms stand before the
+name (`log_`, `sqrt_`, `relative_`; the one next to the name is applied first). A summary
+of its course stands after it (`_rate`, `_mean`, `_deviation`, `_roughness`):
 `sqrt_left_force`, `relative_skin_force_rate`, `sqrt_taxel_force_mean`. `@10` at the end
 takes the feature at ten times of the window, whatever the model's number of samples.
-
-Zones: `contact` is the region that is followed, `skin` all active taxels, `left` and
-`right` the active taxels in the first and second half of the columns (the two pads of a
-hand, the two sides of a forearm). Centroids and spreads are weighted by force. Only
-zones that some feature needs are measured.
+Only zones that some feature needs are measured.
 """
 
 import difflib
 import re
+from collections.abc import Sequence
+from dataclasses import dataclass
 from functools import lru_cache
 
 from edge.errors import InputError
-from edge.features.feature import KERNELS, OF_CELLS, PAPER, Feature
+from edge.features.quantities import ALONE, OF_ZONES, Quantity
+from edge.features.zones import ZONES, Zones
+from edge.touch.contact import Measures
+from edge.touch.joint_angles import JointAngles
+from edge.touch.layout import SkinLayout
 
-ZONES = ("contact", "skin", "left", "right")
-QUANTITIES = tuple(
-    "max_force force area pressure along around spread_along spread_around slant "
-    "length width".split()
-)
-"""Of a zone: its taxels' largest force and the sum of their forces; their number; force
-over area; the row and column of the centroid, followed across the seam; the standard
-deviations of rows and columns, and their covariance, an orientation without an angle
-that jumps; the standard deviations along the longer and the shorter principal axis."""
-ALONE = {
-    "max_force": ("contact", "max_force"),
-    "contact_motion": ("contact", "motion"),
-    "force_motion": ("contact", "force_motion"),
-    "stiffness": ("skin", "stiffness"),
-    "taxel_force": ("skin", "taxel_force"),
-    "taxel_shear": ("skin", "taxel_shear"),
-    "taxel_kernels": ("skin", "taxel_kernels"),
-    "zone_kernels": ("skin", "zone_kernels"),
-    "joint_change": ("arm", "joint_change"),
-    "joint_angle": ("arm", "joint_angle"),
-}
-"""Names that are not a zone and a quantity."""
-ZONES_OF = {
-    "stiffness": ("contact", "skin"),
-    "force_motion": ("contact",),
-    "zone_kernels": ZONES,
-}
-"""The zones of quantities that need others than their own, or more."""
-WIDE = (*OF_CELLS, *KERNELS, "joint_change", "joint_angle")
-"""Quantities of many values: one for each cell of the skin, kernel or
-joint."""
-SHEAR = ("shear_along", "shear_around", "shear_size", "shear_ratio")
-"""Quantities of a zone of a skin of three axes, see `edge.features.shear`."""
-OF_SHEAR = (*SHEAR, "taxel_shear")
-"""All quantities of such a skin alone."""
-SIGNED = frozenset(
-    "around slant joint_change joint_angle shear_along shear_around taxel_shear".split()
-)
-"""Quantities that may be negative, and so have no logarithm."""
-
+PAPER = ("max_force", "contact_area", "contact_motion")
+"""The three features of the paper's section III-B, in its order."""
 TRANSFORMS = ("log", "sqrt", "relative")
 """Transforms of a feature's value: the logarithm of the value plus a floor (see
 `edge.features.vector`), the square root with the value's sign, and the value over its
@@ -74,10 +38,36 @@ _NAME = re.compile(
 MOST_SAMPLES = 10_000
 
 
+@dataclass(frozen=True)
+class Feature:
+    """A feature type.
+
+    Attributes:
+        name: users select it by this name.
+        zone: one of `ZONES`, or `arm`.
+        quantity: that is measured.
+        transforms: of its value, in the order in which they are applied.
+        summary: one of `SUMMARIES`, or empty for its course.
+        samples: times at which it is taken; 0 for the model's number.
+    """
+
+    name: str
+    zone: str
+    quantity: Quantity
+    transforms: tuple[str, ...] = ()
+    summary: str = ""
+    samples: int = 0
+
+    @property
+    def zones(self) -> tuple[str, ...]:
+        """The zones whose sums it needs."""
+        return self.quantity.zones if self.quantity.zone else (self.zone,)
+
+
 def names() -> list[str]:
     """All feature types without transforms and summaries, the paper's first."""
-    zones = [f"{zone}_{name}" for zone in ZONES for name in QUANTITIES + SHEAR]
-    unique = dict.fromkeys((*PAPER, *ALONE, *zones))
+    zones = [f"{zone}_{name}" for zone in ZONES for name in OF_ZONES]
+    unique = dict.fromkeys((*ALONE, *zones))
     del unique["contact_max_force"]
     return list(unique)
 
@@ -94,56 +84,37 @@ def feature(name: str) -> Feature:
         raise _no_feature(name, name)
     prefix, base, summary, times = match.groups("")
     transforms = tuple(reversed(prefix.split("_")[:-1]))
-    zone, quantity = _zone_and_quantity(name, base)
+    zone, _, part = base.partition("_")
+    of_zone = OF_ZONES if zone in ZONES and base != "contact_max_force" else {}
+    quantity = ALONE.get(base) or of_zone.get(part)
+    if quantity is None:
+        raise _no_feature(name, base)
+    _check(name, base, quantity, transforms)
+    samples = int(times or 0)
+    if times and not 2 <= samples <= MOST_SAMPLES:
+        raise InputError(
+            f"the feature {name!r} must be taken at 2 to {MOST_SAMPLES} times"
+        )
+    return Feature(name, quantity.zone or zone, quantity, transforms, summary, samples)
+
+
+def _check(
+    name: str, base: str, quantity: Quantity, transforms: tuple[str, ...]
+) -> None:
+    """Refuse transforms that a quantity cannot take."""
     if len(set(transforms)) < len(transforms):
         raise InputError(
             f"the feature {name!r} applies one transform twice; once is enough"
         )
-    if "log" in transforms and quantity in SIGNED:
+    if "log" in transforms and quantity.signed:
         raise InputError(
             f"the feature {name!r} may be negative and has no logarithm; take "
             f"sqrt_{base}"
         )
-    if quantity in KERNELS and base != name:
+    if quantity.kernels and base != name:
         raise InputError(
             f"{base} takes no transform, summary or number of times, as in {name!r}"
         )
-    if times and not 2 <= int(times) <= MOST_SAMPLES:
-        raise InputError(
-            f"the feature {name!r} must be taken at 2 to {MOST_SAMPLES} times"
-        )
-    return Feature(
-        name,
-        zone,
-        quantity,
-        transforms,
-        summary,
-        samples=int(times or 0),
-        zones=_zones(zone, quantity),
-        wide=quantity in WIDE,
-        of_joints=zone == "arm",
-        kernels=KERNELS.get(quantity, 0),
-    )
-
-
-def _zone_and_quantity(name: str, base: str) -> tuple[str, str]:
-    """The zone and the quantity of a feature without transforms and summary."""
-    if base in ALONE:
-        return ALONE[base]
-    zone, _, quantity = base.partition("_")
-    exists = zone in ZONES and quantity in QUANTITIES + SHEAR
-    if not exists or base == "contact_max_force":
-        raise _no_feature(name, base)
-    return zone, quantity
-
-
-def _zones(zone: str, quantity: str) -> tuple[str, ...]:
-    """The zones whose sums a quantity needs, besides the region's own peak and area."""
-    if quantity in ZONES_OF:
-        return ZONES_OF[quantity]
-    with_region = zone == "contact" and quantity in ("max_force", "area")
-    of_zone = quantity in QUANTITIES + SHEAR
-    return (zone,) if of_zone and not with_region else ()
 
 
 def _no_feature(name: str, base: str) -> InputError:
@@ -152,3 +123,54 @@ def _no_feature(name: str, base: str) -> InputError:
     return InputError(
         f"there is no feature {name!r}; the nearest are {', '.join(nearest)}"
     )
+
+
+def feature_types(names: Sequence[str]) -> tuple[Feature, ...]:
+    """The feature types of several names.
+
+    Raises:
+        InputError: no name is given, one of them does not exist, or one is given twice.
+    """
+    if not names:
+        raise InputError(f"no feature named; the paper's are {', '.join(PAPER)}")
+    twice = {name for name in names if names.count(name) > 1}
+    if twice:
+        raise InputError(f"the feature {min(twice)} is named twice; leave one out")
+    return tuple(map(feature, names))
+
+
+def measures(layout: SkinLayout, names: Sequence[str], joints: int = 0) -> Measures:
+    """What a tracker must measure for features.
+
+    Args:
+        layout: the skin.
+        names: of the features.
+        joints: joint angles of a frame.
+
+    Raises:
+        InputError: a feature does not exist.
+    """
+    types = feature_types(names)
+    quantities = [feature.quantity for feature in types]
+    motions = {quantity.motion for quantity in quantities}
+    angles = any(quantity.of_joints for quantity in quantities)
+    return Measures(
+        motion="motion" in motions,
+        force_motion="force_motion" in motions,
+        zones=_zones(layout, types),
+        joints=JointAngles(joints) if joints and angles else None,
+        cells={of.name: of.cells(layout) for of in quantities if of.cells},
+    )
+
+
+def _zones(layout: SkinLayout, types: Sequence[Feature]) -> Zones | None:
+    zones = {zone for feature in types for zone in feature.zones}
+    sheared = any(
+        feature.quantity.shear and not feature.quantity.cells for feature in types
+    )
+    return Zones(layout, zones, sheared) if zones else None
+
+
+def not_measured(name: str) -> InputError:
+    """The error for a feature that the contact's series lacks."""
+    return InputError(f"{name} was not measured; name it where contacts are followed")

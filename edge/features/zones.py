@@ -1,24 +1,35 @@
-"""The whole numbers of the zones of a skin in a frame, and the quantities that they
-make."""
+"""The whole numbers of the zones of a skin in a frame, and what quantities make of
+them.
+
+Zones: `contact` is the region that is followed, `skin` all active taxels, `left` and
+`right` the active taxels in the first and second half of the columns (the two pads of a
+hand, the two sides of a forearm). Centroids and spreads are weighted by force. A skin of
+three axes gives each taxel's force along the rows (elbow to wrist) and around the
+columns too, in the counts of its normal force.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Collection
+from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
-from edge.arrays import Array, Floats, Integers
-from edge.features.feature import Feature
-from edge.features.names import SHEAR, ZONES
-from edge.features.transforms import force_floor, length_floor
+from edge.arrays import Array, Booleans, Floats, Integers
+from edge.touch.contact import FeatureSeries
 from edge.touch.grid import best_cut
 from edge.touch.layout import SkinLayout
 from edge.touch.region import ActiveTaxels, Region
 
+ZONES = ("contact", "skin", "left", "right")
 ZONE_WIDTH = 8
 """Whole numbers of a zone, in this order: largest count, taxels, sum of counts, and the
 sums of counts times row, column, row squared, row times column, column squared."""
+SHEAR_WIDTH = 2
+"""Whole numbers of a zone's shear: the sums of both components. They stand behind the
+zone's other numbers."""
 
 
 class Zones:
@@ -26,20 +37,14 @@ class Zones:
 
     Attributes:
         names: of the zones, in the order of `ZONES`.
-        width: whole numbers of a zone, those of its shear included where a feature
-            needs them.
+        width: whole numbers of a zone, those of its shear included.
     """
 
-    def __init__(self, layout: SkinLayout, features: Sequence[Feature]) -> None:
-        zones = {zone for feature in features for zone in feature.zones}
+    def __init__(
+        self, layout: SkinLayout, zones: Collection[str], shear: bool = False
+    ) -> None:
         self.names = tuple(zone for zone in ZONES if zone in zones)
-        self.width = ZONE_WIDTH
-        self._shear_sums: Callable[..., list[int]] | None = None
-        if any(feature.quantity in SHEAR for feature in features):
-            from edge.features import shear  # few skins have three axes
-
-            self.width += shear.WIDTH
-            self._shear_sums = shear.sums
+        self.width = ZONE_WIDTH + SHEAR_WIDTH * shear
         self._wraps = layout.wraps
         half = layout.cols // 2
         self._halves = {"left": slice(0, half), "right": slice(half, layout.cols)}
@@ -61,7 +66,7 @@ class Zones:
         Args:
             active: the frame's active taxels.
             contact: the region followed; None where no taxel of it is active.
-            shear: of the frame, where a feature needs it.
+            shear: (rows, cols, 2) of the frame, where a feature needs it.
         """
         if contact is None:
             return [0] * (self.width * len(self.names))
@@ -79,9 +84,9 @@ class Zones:
             ).tolist()
             row += int(counts.max(initial=0)), int(np.count_nonzero(counts))
             row += force, rows, cols, rows_rows, rows_cols, cols_cols
-            if self._shear_sums is not None:
+            if self.width > ZONE_WIDTH:
                 assert shear is not None
-                row += self._shear_sums(shear[:, half], mask[:, half])
+                row += _shear_sums(shear[:, half], mask[:, half])
         return row
 
     def split(self, rows: Integers) -> dict[str, Integers]:
@@ -91,70 +96,117 @@ class Zones:
         )
 
 
-def quantities_of(
-    zones: Mapping[str, Integers],
-    force_motion: Floats | None,
-    layout: SkinLayout,
-) -> dict[str, dict[str, Array]]:
-    """{zone: {quantity: (n,)}} of a `FeatureSeries`."""
-    values = {zone: quantities(sums, layout) for zone, sums in zones.items()}
-    if "skin" in values and force_motion is not None:
-        force = values["skin"]["force"] + force_floor(layout)
-        values["skin"]["stiffness"] = force / (force_motion + length_floor(layout))
-    return values
+def _shear_sums(shear: NDArray[np.int16], mask: Booleans) -> list[int]:
+    """The `SHEAR_WIDTH` whole numbers of a zone, from its shear and its active
+    taxels."""
+    touched = shear * mask[..., None]
+    return list(map(int, touched.sum(axis=(0, 1), dtype=np.int64)))
 
 
-def quantities(sums: Integers, layout: SkinLayout) -> dict[str, Array]:
-    """{quantity: (n,)} of a zone, from its whole numbers, those of shear included.
+@dataclass(frozen=True)
+class ZoneSeries:
+    """The numbers of a zone in the frames of a contact.
 
     The centroid of an empty zone is NaN, everything else of it 0.
     """
-    if sums.shape[1] > ZONE_WIDTH:
-        from edge.features import shear  # few skins have three axes
 
-        return shear.quantities(sums, layout) | quantities(sums[:, :ZONE_WIDTH], layout)
-    scale = layout.counts_per_newton or 1.0
-    peak, area, force, row_sum, col_sum, *_ = sums.T
-    along, around = np.full((2, len(sums)), np.nan)
-    touched = force > 0
-    np.divide(row_sum, force, out=along, where=touched)
-    np.divide(col_sum, force, out=around, where=touched)
-    if layout.wraps:
-        # A contact that crosses the seam goes on; it does not jump to the other end.
-        turn = layout.cols
-        around[touched] = np.unwrap(around[touched] % turn, period=turn)
-    # Variances and the covariance are whole numbers times force squared, so nothing
-    # cancels. Products beyond 64 bits, of large skins, take Python's integers.
-    bound = int(sums.max(initial=0)) * int(force.max(initial=0))
-    exact = sums if bound < 1 << 62 else sums.astype(object)
-    _, _, f, r, c, rr, rc, cc = exact.T
-    total = np.maximum(force, 1).astype(np.float64)
-    rows, cols, slant = (
-        (f * products - a * b).astype(np.float64) / total / total
-        for products, a, b in ((rr, r, r), (cc, c, c), (rc, r, c))
-    )
-    across = rows - cols
-    larger = 0.5 * (rows + cols + np.sqrt(across * across + 4.0 * slant * slant))
-    # The smaller eigenvalue is the determinant over the larger one: the difference of
-    # the eigenvalues' terms would cancel. For a perfect line, rounding leaves less than
-    # 2^-25 of the skin's larger side.
-    determinant = np.maximum(rows * cols - slant * slant, 0.0)
-    smaller = np.divide(
-        determinant,
-        larger,
-        out=np.zeros_like(larger),
-        where=larger > 0,
-    )
-    return {
-        "max_force": peak / scale,
-        "force": force / scale,
-        "area": area,
-        "pressure": force / (np.maximum(area, 1) * scale),
-        "along": along,
-        "around": around,
-        "spread_along": np.sqrt(rows),
-        "spread_around": np.sqrt(cols),
-        "slant": slant,
-        "length": np.sqrt(larger),
-        "width": np.sqrt(smaller),
-    }
+    series: FeatureSeries
+    zone: str
+
+    @property
+    def scale(self) -> float:
+        """Counts per newton, or 1."""
+        return self.series.layout.counts_per_newton or 1.0
+
+    @property
+    def sums(self) -> Integers:
+        """(n, width) whole numbers."""
+        return self.series.zones[self.zone]
+
+    @property
+    def peak(self) -> Array:
+        """(n,) the largest count."""
+        return self.sums[:, 0]
+
+    @property
+    def area(self) -> Array:
+        """(n,) number of active taxels."""
+        return self.sums[:, 1]
+
+    @property
+    def taxels(self) -> Array:
+        """(n,) the same as a divisor: at least 1."""
+        return np.maximum(self.area, 1)
+
+    @property
+    def force(self) -> Array:
+        """(n,) sum of counts."""
+        return self.sums[:, 2]
+
+    @property
+    def along(self) -> Floats:
+        """(n,) row of the centroid."""
+        return self._over_force(self.sums[:, 3], np.nan)
+
+    @property
+    def around(self) -> Floats:
+        """(n,) column of the centroid."""
+        around = self._over_force(self.sums[:, 4], np.nan)
+        if self.series.layout.wraps:
+            # A contact that crosses the seam goes on; it does not jump to the other
+            # end.
+            turn = self.series.layout.cols
+            touched = self.force > 0
+            around[touched] = np.unwrap(around[touched] % turn, period=turn)
+        return around
+
+    def _over_force(self, values: Array, empty: float) -> Floats:
+        shares = np.full(len(values), empty)
+        np.divide(values, self.force, out=shares, where=self.force > 0)
+        return shares
+
+    @cached_property
+    def spreads(self) -> Floats:
+        """(5, n) standard deviations of rows and of columns, their covariance, standard
+        deviations along the longer and the shorter principal axis."""
+        # Variances and the covariance are whole numbers times force squared, so nothing
+        # cancels. Products beyond 64 bits, of large skins, take Python's integers.
+        sums = self.sums[:, :ZONE_WIDTH]
+        bound = int(sums.max(initial=0)) * int(self.force.max(initial=0))
+        exact = sums if bound < 1 << 62 else sums.astype(object)
+        _, _, f, r, c, rr, rc, cc = exact.T
+        total = np.maximum(self.force, 1).astype(np.float64)
+        rows, cols, slant = (
+            (f * products - a * b).astype(np.float64) / total / total
+            for products, a, b in ((rr, r, r), (cc, c, c), (rc, r, c))
+        )
+        across = rows - cols
+        larger = 0.5 * (rows + cols + np.sqrt(across * across + 4.0 * slant * slant))
+        # The smaller eigenvalue is the determinant over the larger one: the difference
+        # of the eigenvalues' terms would cancel. For a perfect line, rounding leaves
+        # less than 2^-25 of the skin's larger side.
+        determinant = np.maximum(rows * cols - slant * slant, 0.0)
+        smaller = np.divide(
+            determinant,
+            larger,
+            out=np.zeros_like(larger),
+            where=larger > 0,
+        )
+        along, around, longer, shorter = np.sqrt([rows, cols, larger, smaller])
+        return np.stack([along, around, slant, longer, shorter])
+
+    @property
+    def shear(self) -> Integers:
+        """(2, n) sums of the shear along the rows and around the columns."""
+        return self.sums.T[-SHEAR_WIDTH:]
+
+    @property
+    def shear_size(self) -> Floats:
+        """(n,) length of the sum of the taxels' shear."""
+        along, around = self.shear.astype(np.float64)
+        return np.asarray(np.sqrt(along**2 + around**2))
+
+    @property
+    def shear_ratio(self) -> Floats:
+        """(n,) that length over the normal force."""
+        return self._over_force(self.shear_size, 0.0)

@@ -9,12 +9,11 @@ from operator import itemgetter
 from typing import TYPE_CHECKING
 
 from edge.errors import InputError
-from edge.features.feature import PAPER
 from edge.touch.contact import (
     CLOCK_ROUNDING_S,
     Contact,
     FeatureSeries,
-    Measurer,
+    Measures,
     region_time,
     released,
 )
@@ -72,8 +71,7 @@ class ContactTracker:
         *,
         chain: Chain | None = None,
         horizon_s: float = math.inf,
-        features: Sequence[str] = PAPER,
-        joints: int = 0,
+        measures: Measures | None = None,
         max_contacts: int = 1,
     ) -> None:
         """Follow contacts on a skin.
@@ -86,13 +84,12 @@ class ContactTracker:
                 joint angles; without, on the skin.
             horizon_s: seconds from onset after which a contact's series takes in no
                 more.
-            features: names of the features that the series is for (see
-                `edge.features.names`); nothing else is measured.
-            joints: joint angles of a frame, where a feature is made of them.
+            measures: what is measured, as `edge.features.names.measures` makes it; None
+                measures what the paper's features take.
             max_contacts: how many are followed at once, the largest first.
 
         Raises:
-            InputError: a feature does not exist, or `max_contacts` is below 1.
+            InputError: `max_contacts` is below 1.
         """
         if max_contacts < 1:
             raise InputError(f"max_contacts must be at least 1, not {max_contacts!r}")
@@ -103,7 +100,7 @@ class ContactTracker:
         self.region: Region | None = None
         self._debounce = debounce
         self._chain = chain
-        self._measurer = Measurer(layout, features, joints)
+        self._measures = measures or Measures()
         self.max_contacts = max_contacts
         self.contacts: list[Contact] = []
         self._t = -math.inf
@@ -208,7 +205,8 @@ class ContactTracker:
     def _begin(self, frame: Frame, region: Region | None) -> Contact:
         on_skin = self.motion_on_skin and frame.joints is None
         chain = None if on_skin else self._chain
-        return Contact(region_time(frame, region), region, self._measurer, chain)
+        onset_s = region_time(frame, region)
+        return Contact(onset_s, region, self.layout, self._measures, chain)
 
     def _follow(
         self,
@@ -253,8 +251,8 @@ class ContactTracker:
         if frame.t < self._t:
             raise InputError(f"time goes back from {self._t} to {frame.t} s")
         self._t = frame.t
-        if self._measurer.joints is not None:
-            self._measurer.joints.watch(frame)
+        if self._measures.joints is not None:
+            self._measures.joints.watch(frame)
 
 
 def shared(

@@ -17,9 +17,10 @@ from edge.decide.info import Novelty, margin
 from edge.decide.model import Model
 from edge.elementary import logistic
 from edge.errors import InputError
-from edge.features import names as measures
-from edge.features.feature import KERNELS
 from edge.features.kernels import KernelTable, channels_of
+from edge.features.names import feature
+from edge.features.names import names as all_names
+from edge.features.quantities import KERNELS
 from edge.record.recording import Recording, load
 from edge.record.saving import save
 from edge.touch.layout import SkinLayout
@@ -223,9 +224,9 @@ SKINS = [
 def spelled(rng):
     """Names of features of every kind, with transforms and summaries."""
     names = []
-    for name in measures.names():
+    for name in all_names():
         if name not in KERNELS and "shear" not in name:
-            signed = measures.feature(name).quantity in measures.SIGNED
+            signed = feature(name).quantity.signed
             prefixes = ["", "sqrt_", "relative_"]
             prefixes += [] if signed else ["log_", "log_relative_", "sqrt_log_"]
             prefix, second = rng.choice(prefixes, 2)

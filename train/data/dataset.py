@@ -17,9 +17,9 @@ from joblib import delayed
 
 from edge.arrays import Booleans, Floats
 from edge.errors import InputError
-from edge.features import names as measures
-from edge.features.feature import KERNELS, Feature
 from edge.features.kernels import KernelTable, kernel_channels
+from edge.features.names import Feature, feature, feature_types
+from edge.features.quantities import KERNELS
 from edge.features.vector import FEATURES, SAMPLES, WINDOW_S, feature_vector, widths
 from edge.files import read_bytes
 from edge.record.labels import read_table
@@ -27,7 +27,6 @@ from edge.record.npz import LARGEST_BYTES
 from edge.record.recording import Recording, load
 from edge.record.saving import find
 from edge.touch.arm import Chain
-from edge.touch.contact import feature_types
 from edge.touch.layout import SkinLayout
 from train.data.arms import arm_of, joint_angles
 from train.data.contacts import (
@@ -210,7 +209,7 @@ class DataSet:
             names=measured_names,
             layout=replace(self.layout, axes=axes(types)),
             chain=self.chain if any(map(moves, types)) else None,
-            joints=self.joints if any(feature.of_joints for feature in types) else 0,
+            joints=self.joints if any(of.quantity.of_joints for of in types) else 0,
             kernels={
                 name: table
                 for name, table in self.kernels.items()
@@ -221,7 +220,7 @@ class DataSet:
     @property
     def units(self) -> dict[str, str]:
         """The unit of each feature."""
-        return {name: unit(measures.feature(name), self.layout) for name in self.names}
+        return {name: unit(feature(name), self.layout) for name in self.names}
 
 
 def read(data: Sequence[str | Path], *, progress: bool = False) -> Recordings:
@@ -295,7 +294,7 @@ class Measurement:
     @property
     def of_joints(self) -> bool:
         """Whether a feature is made of joint angles."""
-        return any(feature.of_joints for feature in self.types)
+        return any(of.quantity.of_joints for of in self.types)
 
     def layout(self, data: Recordings) -> SkinLayout:
         """The skin of recordings, as it is measured.

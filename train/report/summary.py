@@ -11,7 +11,7 @@ from sklearn.neighbors import NearestNeighbors
 from edge.app.commands.info import doubt
 from edge.arrays import Floats
 from edge.errors import printable
-from edge.features import names as measures
+from edge.features.names import feature
 from train.choose.protocols import HALVINGS
 from train.choose.settings import Chosen
 from train.data import outliers
@@ -57,7 +57,7 @@ def summary(fitted: Fitted, prices: Prices) -> str:
             early = _described(fitted.early.choices[task], fitted)
             lines.append(f"  before {fitted.window_s:g} s: {early}")
     lines += ["", *_by_unit(fitted.dataset.units)]
-    if any(map(moves, map(measures.feature, fitted.dataset.names))):
+    if any(map(moves, map(feature, fitted.dataset.names))):
         frame = "along the skin" if fitted.dataset.chain is None else "in the world"
         lines.append(f"contact motion is measured {frame}")
     sequential = fitted.sequential
@@ -197,7 +197,7 @@ def _outliers(fitted: Fitted) -> Iterator[str]:
     names = [
         name
         for name in fitted.dataset.names
-        if "kernels" not in name and not measures.feature(name).wide
+        if "kernels" not in name and not feature(name).quantity.wide
     ]
     if names:
         used = fitted.dataset.of(names)
@@ -210,7 +210,7 @@ def _task_warnings(fitted: Fitted, task: str) -> Iterator[str]:
     fitted_task = fitted.classifier.tasks_[task]
     choice = fitted.chosen[task].choice
     components = fitted_task.components
-    if any(measures.feature(n).quantity == "joint_angle" for n in choice.features):
+    if any(feature(n).quantity.name == "joint_angle" for n in choice.features):
         share = posture_accuracy(fitted.dataset, task)
         yield (
             f"{'warning: ' if share > LEAK else ''}{task}: the joint angles at onset alone "

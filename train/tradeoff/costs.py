@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from edge.features.names import OF_SHEAR, feature
+from edge.features.names import feature
 from edge.features.vector import WINDOW_S
 from edge.touch.layout import SkinLayout
 from train.choose.settings import Chosen
@@ -113,7 +113,7 @@ def _fewer_taxels(raw: Recordings, layout: SkinLayout) -> Iterator[Change]:
 
 def without_shear(dataset: DataSet) -> DataSet:
     """The same trials without the features of shear."""
-    names = [name for name in dataset.names if feature(name).quantity not in OF_SHEAR]
+    names = [name for name in dataset.names if not feature(name).quantity.shear]
     return dataset.of(names)
 
 

@@ -6,6 +6,7 @@ import pytest
 
 from edge.demo import FOLDER
 from edge.features.kernels import BIASES, kernel_channels
+from edge.features.names import measures
 from edge.features.vector import WINDOW_S, feature_vector
 from edge.record.recording import load
 from edge.touch.arm import Chain
@@ -24,8 +25,9 @@ def together(names):
 
 
 def tracker(recording, features):
-    arm = {"chain": Chain.cody(), "joints": recording.joints.shape[1]}
-    return ContactTracker(recording.layout, features=features, **arm)
+    layout = recording.layout
+    measured = measures(layout, features, recording.joints.shape[1])
+    return ContactTracker(layout, chain=Chain.cody(), measures=measured)
 
 
 @pytest.mark.parametrize("names", [*(name for name in SETS if name != "shear"), WHOLE])

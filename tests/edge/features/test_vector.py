@@ -154,19 +154,21 @@ BITS = """
 import hashlib
 import edge
 from edge import demo
-from edge.features import names as measures
+from edge.features.names import feature, measures
+from edge.features.names import names as all_names
 from edge.features.vector import feature_vector
 from edge.touch.track import first_contact
 from edge.touch.track import ContactTracker
 
-names = [n for n in measures.names() if "kernels" not in n and "shear" not in n]
-logs = [n for n in names if measures.feature(n).quantity not in measures.SIGNED]
+names = [n for n in all_names() if "kernels" not in n and "shear" not in n]
+logs = [n for n in names if not feature(n).quantity.signed]
 names += [f"log_{name}" for name in logs]
 names += [f"sqrt_{name}_deviation" for name in logs]
 for path in sorted(demo.FOLDER.glob("*.npz")):
     recording = edge.load(path)
-    joints = {"chain": edge.Chain.cody(), "joints": 5}
-    tracker = ContactTracker(recording.layout, features=names, **joints)
+    measured = measures(recording.layout, names, 5)
+    chain = edge.Chain.cody()
+    tracker = ContactTracker(recording.layout, chain=chain, measures=measured)
     _, series = first_contact(recording, tracker)
     vector = feature_vector(series, 1.2, features=names)
     print(hashlib.sha256(vector.tobytes()).hexdigest())
