@@ -23,9 +23,8 @@ from edge.elementary import log, logistic, sin
 from edge.errors import InputError
 from edge.features.cells import KERNEL_CELLS, Cells
 from edge.features.kernels import BIASES, CONVOLUTIONS, KernelTable, mixes
-from edge.features.names import feature_types
+from edge.features.names import feature_types, zones_of
 from edge.features.quantities import ALONE, OF_ZONES, force_floor, length_floor
-from edge.features.zones import ZONES
 from edge.touch.layout import SkinLayout
 from edge.writing import write_whole
 from export.c_graph import CompiledGraph, Step
@@ -148,8 +147,7 @@ class Source:
         self._types = feature_types(model.info.features)
         windows_s = model.decision_points_s
         self._last = len(windows_s) if error is not None else 1
-        zones = {zone for feature in self._types for zone in feature.zones}
-        self._zones = [zone for zone in ZONES if zone in zones]
+        self._zones = zones_of(self._types)
         self.values: dict[str, object] = {
             "early": error is not None,
             "windows_s": windows_s[-self._last :],

@@ -152,23 +152,25 @@ def measures(layout: SkinLayout, names: Sequence[str], joints: int = 0) -> Measu
     """
     types = feature_types(names)
     quantities = [feature.quantity for feature in types]
+    zones = zones_of(types)
     motions = {quantity.motion for quantity in quantities}
-    angles = any(quantity.of_joints for quantity in quantities)
+    of_joints = any(quantity.of_joints for quantity in quantities)
     return Measures(
         motion="motion" in motions,
         force_motion="force_motion" in motions,
-        zones=_zones(layout, types),
-        joints=JointAngles(joints) if joints and angles else None,
+        zones=Zones(layout, zones, _sums_shear(types)) if zones else None,
+        joints=JointAngles(joints) if joints and of_joints else None,
         cells={of.name: of.cells(layout) for of in quantities if of.cells},
     )
 
 
-def _zones(layout: SkinLayout, types: Sequence[Feature]) -> Zones | None:
-    zones = {zone for feature in types for zone in feature.zones}
-    sheared = any(
-        feature.quantity.shear and not feature.quantity.cells for feature in types
-    )
-    return Zones(layout, zones, sheared) if zones else None
+def _sums_shear(types: Sequence[Feature]) -> bool:
+    return any(of.quantity.shear for of in types if of.zones)
+
+
+def zones_of(types: Sequence[Feature]) -> list[str]:
+    """The zones whose sums features need, in the order of `ZONES`."""
+    return [zone for zone in ZONES if any(zone in of.zones for of in types)]
 
 
 def not_measured(name: str) -> InputError:

@@ -10,7 +10,7 @@ columns too, in the counts of its normal force.
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -40,10 +40,8 @@ class Zones:
         width: whole numbers of a zone, those of its shear included.
     """
 
-    def __init__(
-        self, layout: SkinLayout, zones: Collection[str], shear: bool = False
-    ) -> None:
-        self.names = tuple(zone for zone in ZONES if zone in zones)
+    def __init__(self, layout: SkinLayout, names: Sequence[str], shear: bool) -> None:
+        self.names = names
         self.width = ZONE_WIDTH + SHEAR_WIDTH * shear
         self._wraps = layout.wraps
         half = layout.cols // 2

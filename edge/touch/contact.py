@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, Protocol, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from edge.arrays import Array, Booleans, Counts, Floats, Integers
+from edge.arrays import Booleans, Counts, Floats, Integers
 from edge.elementary import length
 from edge.errors import InputError
 from edge.touch.frame import Frame
@@ -119,10 +119,10 @@ class ZoneMeasure(Protocol):
         """{zone: (n, width)} of the numbers of frames."""
 
 
-class Reader(Protocol):
-    """Reads values of a frame."""
+class CellMeasure(Protocol):
+    """Measures cells of the skin in a frame."""
 
-    def read(self, frame: Frame) -> Array:
+    def read(self, frame: Frame) -> Integers:
         """(values,) of a frame."""
 
 
@@ -143,7 +143,7 @@ class Measures:
     force_motion: bool = False
     zones: ZoneMeasure | None = None
     joints: JointAngles | None = None
-    cells: Mapping[str, Reader] = field(default_factory=dict)
+    cells: Mapping[str, CellMeasure] = field(default_factory=dict)
 
 
 class Contact:
@@ -188,9 +188,6 @@ class Contact:
         self.missing_pose = False
         self.joints: Floats | None = None
         self._measures = measures
-        self._readers: dict[str, Reader] = {**measures.cells}
-        if measures.joints is not None:
-            self._readers["joints"] = measures.joints
         self._rows: list[dict[str, Any]] = []
         """One dict per frame, keyed like `FeatureSeries`; `counted` (m,) holds the whole
         numbers of region and zones."""
@@ -233,10 +230,11 @@ class Contact:
             "counted": np.array(counted, dtype=np.int64),
             **self._motions(frame, region, counted),
         }
-        for name, reader in self._readers.items():
-            row[name] = reader.read(frame)
-        if "joints" in row and frame.joints is None:
-            self.missing_pose = True
+        for name, cells in measures.cells.items():
+            row[name] = cells.read(frame)
+        if measures.joints is not None:
+            row["joints"] = measures.joints.read(frame)
+            self.missing_pose |= frame.joints is None
         self._rows.append(row)
         self.age_s = age_s
 
