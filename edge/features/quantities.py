@@ -177,7 +177,7 @@ ALONE = {
         Quantity(
             "zone_kernels",
             "1",
-            lambda _: None,
+            lambda zone: zone.channels,
             "",
             zone="skin",
             zones=ZONES,

@@ -69,8 +69,7 @@ def feature_vector(
 
     >>> import edge
     >>> from edge import demo
-    >>> from edge.touch.track import first_contact
-    >>> from edge.touch.track import ContactTracker
+    >>> from edge.touch.track import ContactTracker, first_contact
     >>> recording = edge.load(demo.FOLDER / "pillow-movable.npz")
     >>> onset_s, series = first_contact(recording, ContactTracker(recording.layout))
     >>> edge.feature_vector(series, window_s=1.2).shape

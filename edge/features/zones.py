@@ -194,6 +194,12 @@ class ZoneSeries:
         return np.stack([along, around, slant, longer, shorter])
 
     @property
+    def channels(self) -> Integers | None:
+        """(n, channels) whole numbers of all zones; None where one was not measured."""
+        zones = [sums[:, :ZONE_WIDTH] for sums in self.series.zones.values()]
+        return np.column_stack(zones) if len(zones) == len(ZONES) else None
+
+    @property
     def shear(self) -> Integers:
         """(2, n) sums of the shear along the rows and around the columns."""
         return self.sums.T[-SHEAR_WIDTH:]

@@ -157,8 +157,7 @@ from edge import demo
 from edge.features.names import feature, measures
 from edge.features.names import names as all_names
 from edge.features.vector import feature_vector
-from edge.touch.track import first_contact
-from edge.touch.track import ContactTracker
+from edge.touch.track import ContactTracker, first_contact
 
 names = [n for n in all_names() if "kernels" not in n and "shear" not in n]
 logs = [n for n in names if not feature(n).quantity.signed]
