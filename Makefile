@@ -209,7 +209,7 @@ $(PEERS)/.ready: pyproject.toml constraints.txt
 	@touch $@
 
 peers-test: $(PEERS)/.ready
-	$(PEERS)/bin/python -m pytest tests/edge/touch/test_kernels.py -k aeon -rs
+	$(PEERS)/bin/python -m pytest tests/edge/features/test_kernels.py -k aeon -rs
 
 $(VENV)/.upkeep: $(READY)
 	@$(call INSTALL,--group upkeep)

@@ -19,11 +19,11 @@ from edge.app.trial_options import add_arm, open_arm
 from edge.decide.classifier import suited
 from edge.decide.model import Model
 from edge.errors import InputError
+from edge.features.vector import WINDOW_S
 from edge.record.labels import read_table
 from edge.record.recording import load
 from edge.record.saving import find, listed
 from edge.record.slips import counts_text
-from edge.touch.features import WINDOW_S
 from edge.touch.layout import for_device
 from edge.wire.skin import file as skinfile
 from edge.writing import check_writable

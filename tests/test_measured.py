@@ -4,7 +4,7 @@ import re
 
 import pytest
 
-from edge.touch.features import WINDOW_S
+from edge.features.vector import WINDOW_S
 from tests.checks.bench import tables
 from tests.checks.hard_cases.registry import CASES
 from tests.conftest import ROOT

@@ -6,7 +6,6 @@ from pathlib import Path
 
 ROOT = Path(__file__).parents[1]
 THROUGH = {
-    "edge/touch/several.py": "edge/test_several_contacts.py",
     "train/study": "train/study/test_study_report.py",
     "train/tradeoff": "train/tradeoff/test_tradeoff.py",
     "train/commands/tradeoff.py": "train/tradeoff/test_tradeoff.py",

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 
 from edge.errors import InputError
+from edge.features.vector import WINDOW_S
 from edge.record.slips import slips, too_few
-from edge.touch.features import WINDOW_S
 from train.choose.decision_points import decision_points, has_early_points
 from train.choose.options import FitOptions, described
 from train.choose.settings import Settings

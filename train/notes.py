@@ -8,7 +8,7 @@ from sklearn.neighbors import NearestNeighbors
 
 from edge.app.output import counted
 from edge.arrays import Floats
-from edge.touch import measures
+from edge.features import names as measures
 from train.data import outliers
 from train.data.dataset import DataSet
 from train.data.labels import NO_CONTACT
@@ -89,7 +89,7 @@ def _outliers(fitted: Fitted) -> Iterator[str]:
     names = [
         name
         for name in fitted.dataset.names
-        if "kernels" not in name and not measures.feature(name).wide
+        if "kernels" not in name and not measures.feature(name).quantity.wide
     ]
     if names:
         used = fitted.dataset.of(names)
@@ -102,7 +102,7 @@ def _task_warnings(fitted: Fitted, task: str) -> Iterator[str]:
     fitted_task = fitted.classifier.tasks_[task]
     choice = fitted.chosen[task].choice
     components = fitted_task.components
-    if any(measures.feature(n).quantity == "joint_angle" for n in choice.features):
+    if any(measures.feature(n).quantity.name == "joint_angle" for n in choice.features):
         share = posture_accuracy(fitted.dataset, task)
         yield (
             f"{'warning: ' if share > LEAK else ''}{task}: the joint angles at onset alone "

@@ -8,7 +8,7 @@ from typing import Generic, NamedTuple, TypeVar
 import numpy as np
 
 from edge.errors import InputError
-from edge.touch.features import WINDOW_S
+from edge.features.vector import WINDOW_S
 from edge.touch.layout import LONGEST_RELEASE_S
 from train.choose.candidates import candidates, features_of
 from train.choose.choose import Choosing

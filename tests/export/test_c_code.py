@@ -17,11 +17,12 @@ from edge.decide.info import Novelty, margin
 from edge.decide.model import Model
 from edge.elementary import logistic
 from edge.errors import InputError
+from edge.features.kernels import KernelTable, channels_of
+from edge.features.names import feature
+from edge.features.names import names as all_names
+from edge.features.quantities import KERNELS, OF_ZONES, Quantity
 from edge.record.recording import load
 from edge.record.saving import save
-from edge.touch import measures
-from edge.touch.feature import KERNELS
-from edge.touch.kernels import KernelTable, channels_of
 from edge.touch.layout import SkinLayout
 from edge.wire.skin import file as skinfile
 from export import c_code, skin_code
@@ -40,6 +41,7 @@ from tests.export.microcontroller.recordings import (
     recordings_for,
 )
 from tests.export.test_early_stopping import pressed
+from train.data.feature_sets import expand, unit
 
 TOOLS = ("arm-none-eabi-gcc", "qemu-system-arm")
 needs_qemu = pytest.mark.skipif(
@@ -222,9 +224,9 @@ SKINS = [
 def spelled(rng):
     """Names of features of every kind, with transforms and summaries."""
     names = []
-    for name in measures.names():
+    for name in all_names():
         if name not in KERNELS and "shear" not in name:
-            signed = measures.feature(name).quantity in measures.SIGNED
+            signed = feature(name).quantity.signed
             prefixes = ["", "sqrt_", "relative_"]
             prefixes += [] if signed else ["log_", "log_relative_", "sqrt_log_"]
             prefix, second = rng.choice(prefixes, 2)
@@ -245,6 +247,32 @@ class NoGraph:
         self.places = {}
 
 
+def measuring(layout, features, **changes):
+    """The demo's model, of another skin and other features."""
+    model = Model(demo.MODEL)
+    model.info = replace(
+        model.info,
+        layout=layout,
+        features=features,
+        chain=model.info.chain if layout.wraps else None,
+        joints=5,
+        **changes,
+    )
+    return model
+
+
+def assert_same_vectors(model, recordings, folder, monkeypatch):
+    """The C of a model makes the vectors of Python."""
+    monkeypatch.setattr(c_code, "CompiledGraph", NoGraph)
+    c_code.export(model, folder)
+    questions = [
+        machine.about_recording(machine.VECTORS_OF_RECORDING, r) for r in recordings
+    ]
+    expected = [machine.vectors(model, [0], recording) for recording in recordings]
+    answers = machine.ask(machine.compiled(folder), folder, questions)
+    assert same(answers, np.concatenate(expected))
+
+
 @pytest.mark.slow
 @needs_gcc
 @pytest.mark.parametrize("skin", range(len(SKINS)))
@@ -253,31 +281,38 @@ def test_every_feature_of_damaged_recordings_has_the_same_bits(
 ):
     rng = np.random.default_rng(skin)
     layout = SKINS[skin]
-    model = Model(demo.MODEL)
     tables = {}
     for name, biases in KERNELS.items():
         shifts = rng.integers(-20, 3, channels_of(name, layout)).tolist()
         limits = rng.integers(-30, 99, biases).tolist()
         tables[name] = KernelTable(tuple(shifts), tuple(limits))
-    model.info = replace(
-        model.info,
-        layout=layout,
-        features=tuple(spelled(rng)),
+    model = measuring(
+        layout,
+        tuple(spelled(rng)),
         samples=int(rng.choice([2, 7, 8, 17, 40, 128])),
-        chain=model.info.chain if layout.wraps else None,
-        joints=5,
         kernels=tables,
         debounce=int(rng.integers(1, 4)),
     )
-    monkeypatch.setattr(c_code, "CompiledGraph", NoGraph)
-    c_code.export(model, tmp_path)
-    command = machine.compiled(tmp_path)
     recordings = [*recordings_for(layout, 25, rng), *on_the_edges(layout)]
-    questions = [
-        machine.about_recording(machine.VECTORS_OF_RECORDING, r) for r in recordings
-    ]
-    expected = [machine.vectors(model, [0], recording) for recording in recordings]
-    assert same(machine.ask(command, tmp_path, questions), np.concatenate(expected))
+    assert_same_vectors(model, recordings, tmp_path, monkeypatch)
+
+
+@needs_gcc
+def test_a_quantity_is_a_record_and_reaches_the_c(tmp_path, monkeypatch):
+    toy = Quantity(
+        "toy",
+        "{force}/taxel",
+        lambda zone: zone.peak / zone.taxels,
+        "(double)zone[0] / (double)(zone[1] > 1 ? zone[1] : 1)",
+    )
+    monkeypatch.setitem(OF_ZONES, toy.name, toy)
+    names = ("skin_toy", "log_left_toy@5", "sqrt_contact_toy_mean")
+    assert {"skin_toy", "left_toy"} < set(all_names())
+    assert len(expand(["moments"])) == 30  # it names its members
+    assert unit(feature("skin_toy_rate"), SKINS[2]) == "newton/taxel/s"
+    model = measuring(SKINS[2], (*names, "skin_width"))
+    recordings = recordings_for(SKINS[2], 2, np.random.default_rng(1))
+    assert_same_vectors(model, recordings, tmp_path, monkeypatch)
 
 
 @needs_gcc

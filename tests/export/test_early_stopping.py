@@ -16,8 +16,8 @@ from edge.decide.events import Decided
 from edge.decide.model import Model
 from edge.decide.verify import first_series, verify
 from edge.errors import InputError, OutOfRange
+from edge.features.vector import FEATURES
 from edge.record.saving import save
-from edge.touch.features import FEATURES
 from export.api import save as save_model
 from tests.checks.hard_cases import exact
 from tests.checks.hard_cases.models import session

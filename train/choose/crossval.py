@@ -13,7 +13,7 @@ import numpy as np
 
 from edge.arrays import Booleans, Floats, Integers
 from edge.errors import InputError
-from edge.touch.features import FEATURES
+from edge.features.vector import FEATURES
 from train.data.vectors import Strings
 from train.model.projection import Grid, Spectrum, on_grid
 from train.model.scaling import centred_and_scaled, finite

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from edge.touch.features import WINDOW_S
+from edge.features.vector import WINDOW_S
 from train.choose.options import MOST_TRIALS, FitOptions
 from train.choose.settings import Settings
 from train.data.dataset import DataSet

@@ -9,9 +9,10 @@ from typing import Any
 from joblib import cpu_count
 
 from edge.app.options import within
-from edge.touch import measures
+from edge.features.quantities import ALONE, OF_ZONES
+from edge.features.vector import SAMPLES, WINDOW_S
+from edge.features.zones import ZONES
 from edge.touch.arm import Chain
-from edge.touch.features import SAMPLES, WINDOW_S
 from train.data.feature_sets import SETS
 from train.data.groups import LEAVE_OUT, TRIAL
 from train.model.projection import KINDS
@@ -65,8 +66,8 @@ class FitOptions:
     features: Sequence[str] | None = option(
         None,
         f"features to measure, instead of a choice: sets ({', '.join(SETS)}) and single "
-        f"features, ZONE_QUANTITY of {', '.join(measures.ZONES)} and "
-        f"{', '.join(measures.QUANTITIES)}, or {', '.join(measures.ALONE)}",
+        f"features, ZONE_QUANTITY of {', '.join(ZONES)} and "
+        f"{', '.join(OF_ZONES)}, or {', '.join(ALONE)}",
         nargs="+",
         metavar="NAME",
     )

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from edge.errors import InputError
+from edge.features.names import measures
 from edge.record.recording import Recording
 from edge.touch.contact import Contact, FeatureSeries
 from edge.touch.frame import Frame
@@ -142,12 +143,15 @@ def follow(
     recording: Recording,
     path: Path,
     layout: SkinLayout,
+    features: Sequence[str],
+    joints: int = 0,
     **tracked: Any,
 ) -> Followed:
     """The contacts of a recording, and the labels of those that are trials."""
     try:
         layout = for_device(layout, recording.layout)
-        tracker = ContactTracker(layout, **tracked)
+        measured = measures(layout, features, joints)
+        tracker = ContactTracker(layout, measures=measured, **tracked)
         tracker.outside = recording.meta.get("onset") is not None
         touches = contacts(recording, tracker)
         return touches, labels_of(recording, len(touches))

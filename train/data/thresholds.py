@@ -8,8 +8,8 @@ from itertools import filterfalse
 import numpy as np
 
 from edge.record.recording import Recording
+from edge.record.thresholds import MARGIN, QUIET_S, above, noise
 from edge.touch.layout import for_device
-from edge.touch.thresholds import MARGIN, QUIET_S, above, noise
 from edge.touch.track import DEBOUNCE, ContactTracker
 from train.data.contacts import contacts, with_thresholds
 from train.data.labels import NO_CONTACT
@@ -45,7 +45,7 @@ class Proposal:
 def proposed(recordings: Sequence[Recording]) -> Proposal:
     """Thresholds from the noise before contact.
 
-    The noise is the 90th percentile of `edge.touch.thresholds.noise` over the
+    The noise is the 90th percentile of `edge.record.thresholds.noise` over the
     recordings that do not begin in contact. The threshold is twice the noise, or as
     high as the noise where that misses more of the recordings labelled with a touch.
     Where no recording has an untouched part, the threshold is the level of the quietest

@@ -9,10 +9,9 @@ from typing import Any
 
 import numpy as np
 
+from edge.decide.doubts import frame_doubts, still_times
 from edge.errors import InputError
 from edge.touch.contact import FeatureSeries
-from edge.touch.doubts import frame_doubts
-from edge.touch.joint_doubts import still_times
 from train.data.dataset import DataSet
 
 OFTEN = 0.2

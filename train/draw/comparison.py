@@ -17,9 +17,9 @@ from edge.decide.classifier import Classifier
 from edge.decide.events import Decided
 from edge.decide.model import Model
 from edge.errors import InputError, about
+from edge.features.vector import WINDOW_S
 from edge.record.recording import Recording
 from edge.touch.contact import FeatureSeries
-from edge.touch.features import WINDOW_S
 from edge.touch.layout import SkinLayout
 from edge.touch.track import ContactTracker
 from edge.writing import write_whole

@@ -19,7 +19,7 @@ from scipy.special import expit
 from edge.arrays import Floats, Integers
 from edge.decide.agreement import agreed
 from edge.errors import InputError
-from edge.touch.features import FEATURES
+from edge.features.vector import FEATURES
 from train.data.vectors import Labels, Strings, Vectors
 from train.model.agreement import factors_of
 from train.model.projection import Projection

@@ -40,7 +40,7 @@ from edge.arrays import Booleans, Floats, Integers
 from edge.decide.info import Novelty, Stopping, StoppingRule
 from edge.elementary import log
 from edge.errors import InputError
-from edge.touch.features import FEATURES
+from edge.features.vector import FEATURES
 from train.data.folds import finest, stratified_folds
 from train.data.vectors import Strings, Vectors
 from train.model.curves import Curve, Evidence, cross_fitted

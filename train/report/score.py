@@ -7,7 +7,7 @@ import numpy as np
 
 from edge.arrays import Booleans, Floats, Integers
 from edge.decide import statistics
-from edge.touch.features import FEATURES
+from edge.features.vector import FEATURES
 from train.choose.crossval import MAX_COMPONENTS, accuracies, neighbours
 from train.choose.evaluate import Result
 from train.data.vectors import Labels, Strings

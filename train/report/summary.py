@@ -8,7 +8,7 @@ from pathlib import Path
 from edge.app.commands.info import doubt
 from edge.app.output import counted
 from edge.errors import printable
-from edge.touch import measures
+from edge.features import names as measures
 from train.choose.settings import Chosen
 from train.data.dataset import DataSet
 from train.data.feature_sets import SETS, expand, moves

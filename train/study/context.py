@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 from edge.arrays import Floats
-from edge.touch.features import FEATURES, SAMPLES, WINDOW_S
+from edge.features.vector import FEATURES, SAMPLES, WINDOW_S
 from train.data.dataset import DataSet
 from train.data.vectors import Labels
 from train.report.work import Workers

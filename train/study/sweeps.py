@@ -4,9 +4,9 @@ from collections.abc import Mapping, Sequence
 from itertools import combinations
 from typing import Any
 
+from edge.features.vector import FEATURES
 from edge.record.recording import Recording
 from edge.touch.arm import Chain
-from edge.touch.features import FEATURES
 from edge.touch.layout import SkinLayout
 from train.choose.evaluate import Result
 from train.data.vectors import Labels

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from edge.touch.features import WINDOW_S
+from edge.features.vector import WINDOW_S
 from edge.touch.layout import SkinLayout
 from train.choose.options import FitOptions
 from train.choose.settings import Chosen

@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 
 from edge.app.output import counted
-from edge.touch.features import WINDOW_S
+from edge.features.names import feature
+from edge.features.vector import WINDOW_S
 from edge.touch.layout import SkinLayout
-from edge.touch.measures import OF_SHEAR, feature
 from train.choose.settings import Chosen
 from train.data.dataset import DataSet, Recordings
 from train.data.folds import finest, stratified_folds
@@ -98,7 +98,7 @@ def _fewer_taxels(raw: Recordings, layout: SkinLayout) -> Iterator[Saving]:
 
 def without_shear(dataset: DataSet) -> DataSet:
     """The same trials without the features of shear."""
-    names = [name for name in dataset.names if feature(name).quantity not in OF_SHEAR]
+    names = [name for name in dataset.names if not feature(name).quantity.shear]
     return dataset.of(names)
 
 

@@ -35,7 +35,7 @@ from numpy.typing import NDArray
 from scipy.stats import binom
 
 from edge.decide.early import fastest
-from edge.touch.features import SAMPLES, WINDOW_S
+from edge.features.vector import SAMPLES, WINDOW_S
 from tests.checks.bench import tables
 from tests.checks.bench.program import start
 from tests.checks.bench.shifts import (

@@ -22,7 +22,7 @@ from sklearn.ensemble import ExtraTreesClassifier
 from sklearn.model_selection import PredefinedSplit, cross_val_predict
 
 from edge.decide.info import StoppingRule
-from edge.touch.features import SAMPLES
+from edge.features.vector import SAMPLES
 from tests.checks.bench import tables
 from tests.checks.bench.program import start
 from train.data.dataset import read

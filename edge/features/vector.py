@@ -3,22 +3,21 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cache, partial
 from itertools import groupby
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from edge.arrays import Array, Floats
 from edge.errors import InputError
-from edge.touch.contact import FeatureSeries, feature_types
-from edge.touch.feature import OF_CELLS, PAPER, Feature, not_measured
+from edge.features import kernels, transforms
+from edge.features.kernels import KernelTable
+from edge.features.names import PAPER, Feature, feature_types, not_measured
+from edge.features.zones import ZoneSeries
+from edge.touch.contact import FeatureSeries
 from edge.touch.layout import SkinLayout
-
-if TYPE_CHECKING:
-    from edge.touch.kernels import KernelTable
 
 FEATURES = PAPER
 SAMPLES = 40
@@ -47,15 +46,14 @@ def widths(
     """
     lengths = []
     for feature in feature_types(names):
-        length = feature.kernels or feature.samples or samples
+        quantity = feature.quantity
+        length = quantity.kernels or feature.samples or samples
         if feature.summary not in ("", "rate"):
             length = 1  # one number for the window
-        if feature.of_joints:
+        if quantity.of_joints:
             length *= joints
-        elif feature.wide and not feature.kernels:
-            from edge.touch.cells import Cells
-
-            length *= Cells(layout).count * OF_CELLS[feature.quantity]
+        elif quantity.cells and not quantity.kernels:
+            length *= quantity.cells(layout).width
         lengths.append(length)
     return tuple(lengths)
 
@@ -71,8 +69,7 @@ def feature_vector(
 
     >>> import edge
     >>> from edge import demo
-    >>> from edge.touch.first_contact import first_contact
-    >>> from edge.touch.track import ContactTracker
+    >>> from edge.touch.track import ContactTracker, first_contact
     >>> recording = edge.load(demo.FOLDER / "pillow-movable.npz")
     >>> onset_s, series = first_contact(recording, ContactTracker(recording.layout))
     >>> edge.feature_vector(series, window_s=1.2).shape
@@ -98,7 +95,7 @@ def feature_vector(
         series: the contact.
         window_s: seconds from onset, above 0.
         samples: times per feature, at least 2.
-        features: names, see `edge.touch.measures`; the series must have been measured
+        features: names, see `edge.features.names`; the series must have been measured
             for them.
         tables: {feature: its table} of those that are made of kernels.
 
@@ -120,7 +117,8 @@ def feature_vector(
     series = series.felt(window_s)
     if series.t.size == 0:
         raise InputError("the contact has no frame")
-    course = _Course(series, window_s, tables or {})
+    zones = cache(partial(ZoneSeries, series))
+    course = _Course(series, window_s, tables or {}, zones)
     # What is too large for a float is refused by the model.
     with np.errstate(all="ignore"):
         groups = [tuple(group) for _, group in groupby(types, key=_kind)]
@@ -129,7 +127,7 @@ def feature_vector(
 
 def _kind(feature: Feature) -> tuple[str, int, tuple[str, ...], str]:
     """The kind of a feature: those of one kind are the rows of one array."""
-    name = feature.name if feature.wide else ""
+    name = feature.name if feature.quantity.wide else ""
     return name, feature.samples, feature.transforms, feature.summary
 
 
@@ -140,24 +138,12 @@ class _Course:
     series: FeatureSeries
     window_s: float
     tables: Mapping[str, KernelTable]
-
-    @property
-    def _scale(self) -> float:
-        return self.series.layout.counts_per_newton or 1.0
-
-    @cached_property
-    def _zones(self) -> dict[str, dict[str, Array]]:
-        from edge.touch import zones  # the paper's features need none
-
-        series = self.series
-        return zones.quantities_of(series.zones, series.force_motion, series.layout)
+    zones: Callable[[str], ZoneSeries]
 
     def block(self, group: tuple[Feature, ...], samples: int) -> Floats:
         """Values of features of one kind, one after another."""
         first = group[0]
-        if first.kernels:
-            from edge.touch import kernels  # few models have convolution features
-
+        if first.quantity.kernels:
             return kernels.shares_of(
                 self.series,
                 self.window_s,
@@ -168,8 +154,6 @@ class _Course:
         step = self.window_s / (samples - 1)
         values = self._sampled(group, np.arange(samples, dtype=np.float64) * step)
         if first.transforms or first.summary:
-            from edge.touch import transforms  # the paper's features have none
-
             values = transforms.transformed(values, group, self.series.layout)
             values = transforms.summarised(values, first.summary, step)
         return values.reshape(-1)
@@ -182,7 +166,7 @@ class _Course:
         """(rows, times) features of one value a frame, or of one wide feature."""
         first = group[0]
         t = self.series.t
-        if first.wide:
+        if first.quantity.wide:
             values = self._measured(first).T
         else:
             values = np.array(list(map(self._measured, group)), dtype=np.float64)
@@ -192,27 +176,17 @@ class _Course:
         sampled[complete] = _resample(times, t, values[complete])
         for i in np.flatnonzero(~complete & valid.any(axis=1)):
             sampled[i] = _resample(times, t[valid[i]], values[i, valid[i]])
-        if first.quantity in OF_CELLS:
-            return sampled / self._scale
-        return sampled - sampled[:, :1] if first.quantity == "joint_change" else sampled
+        if first.quantity.cells:
+            return sampled / self.zones(first.zone).scale
+        is_change = first.quantity.name == "joint_change"
+        return sampled - sampled[:, :1] if is_change else sampled
 
     def _measured(self, feature: Feature) -> Array:
         """(n,) or (n, values) of a feature in every frame; NaN where it cannot be
         known."""
-        series = self.series
-        of_region = {
-            ("contact", "max_force"): series.peak / self._scale,
-            ("contact", "motion"): series.motion,
-            ("contact", "force_motion"): series.force_motion,
-            ("contact", "area"): series.area,
-            ("skin", "taxel_force"): series.taxel_force,
-            ("skin", "taxel_shear"): series.taxel_shear,
-            ("arm", "joint_angle"): series.joints,
-            ("arm", "joint_change"): series.joints,
-        }
-        values = of_region.get((feature.zone, feature.quantity))
-        if values is None:
-            values = self._zones.get(feature.zone, {}).get(feature.quantity)
+        values = None
+        if self.series.zones.keys() >= set(feature.zones):
+            values = feature.quantity.measure(self.zones(feature.zone))
         if values is None:
             raise not_measured(feature.name)
         return values

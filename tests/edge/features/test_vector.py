@@ -9,9 +9,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from edge.errors import InputError
+from edge.features.vector import feature_vector
 from edge.touch.arm import Chain
 from edge.touch.contact import FeatureSeries
-from edge.touch.features import feature_vector
 from edge.touch.layout import SkinLayout
 from tests.conftest import python
 from tests.edge.touch.pressed import followed, pressed
@@ -154,19 +154,20 @@ BITS = """
 import hashlib
 import edge
 from edge import demo
-from edge.touch import measures
-from edge.touch.features import feature_vector
-from edge.touch.first_contact import first_contact
-from edge.touch.track import ContactTracker
+from edge.features.names import feature, measures
+from edge.features.names import names as all_names
+from edge.features.vector import feature_vector
+from edge.touch.track import (ContactTracker, first_contact)
 
-names = [n for n in measures.names() if "kernels" not in n and "shear" not in n]
-logs = [n for n in names if measures.feature(n).quantity not in measures.SIGNED]
+names = [n for n in all_names() if "kernels" not in n and "shear" not in n]
+logs = [n for n in names if not feature(n).quantity.signed]
 names += [f"log_{name}" for name in logs]
 names += [f"sqrt_{name}_deviation" for name in logs]
 for path in sorted(demo.FOLDER.glob("*.npz")):
     recording = edge.load(path)
-    joints = {"chain": edge.Chain.cody(), "joints": 5}
-    tracker = ContactTracker(recording.layout, features=names, **joints)
+    measured = measures(recording.layout, names, 5)
+    chain = edge.Chain.cody()
+    tracker = ContactTracker(recording.layout, chain=chain, measures=measured)
     _, series = first_contact(recording, tracker)
     vector = feature_vector(series, 1.2, features=names)
     print(hashlib.sha256(vector.tobytes()).hexdigest())

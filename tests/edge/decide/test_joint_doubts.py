@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from edge.touch.joint_doubts import joint_doubts, still_times
+from edge.decide.doubts import joint_doubts, still_times
 from edge.touch.layout import SkinLayout
 from tests.edge.touch.pressed import followed, pressed
 

@@ -6,7 +6,7 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
-from edge.touch.transforms import summarised
+from edge.features.transforms import summarised
 
 
 @pytest.mark.parametrize("power", [-1000, -600, 0, 600, 1000])

@@ -23,12 +23,11 @@ from numpy.typing import NDArray
 from edge.arrays import Booleans, Floats, Integers
 from edge.config import ConfigTable
 from edge.errors import InputError
-from edge.touch.cells import KERNEL_CELLS, Cells
+from edge.features.names import not_measured
+from edge.features.quantities import ALONE, KERNELS
+from edge.features.zones import ZONE_WIDTH, ZONES, ZoneSeries
 from edge.touch.contact import CLOCK_ROUNDING_S, FeatureSeries
-from edge.touch.feature import KERNELS, not_measured
 from edge.touch.layout import SkinLayout
-from edge.touch.measures import ZONES
-from edge.touch.zones import ZONE_WIDTH
 
 SAMPLES = 120
 """Times of the window at which a channel is taken: 100 a second in the usual window.
@@ -204,7 +203,7 @@ def kernel_channels(
     window_s: float,
     name: str,
 ) -> Integers:
-    """(channels, `edge.touch.SAMPLES`) numbers to which a feature's kernels are
+    """(channels, `SAMPLES`) numbers to which a feature's kernels are
     applied.
 
     The last value before each time is held, and nothing is interpolated, so all are
@@ -218,11 +217,7 @@ def kernel_channels(
     Raises:
         InputError: the feature was not measured.
     """
-    rows: Integers | None = series.taxel_kernels
-    if name == "zone_kernels":
-        complete = len(series.zones) == len(ZONES)
-        zones = [sums[:, :ZONE_WIDTH] for sums in series.zones.values()]
-        rows = np.column_stack(zones) if complete else None
+    rows = ALONE[name].measure(ZoneSeries(series, "skin"))
     if rows is None:
         raise not_measured(name)
     step_s = window_s / (SAMPLES - 1)
@@ -232,6 +227,5 @@ def kernel_channels(
 
 def channels_of(name: str, layout: SkinLayout) -> int:
     """Number of channels to which the kernels of a feature are applied."""
-    if name == "zone_kernels":
-        return ZONE_WIDTH * len(ZONES)
-    return Cells(layout, KERNEL_CELLS).count
+    cells = ALONE[name].cells
+    return cells(layout).count if cells else ZONE_WIDTH * len(ZONES)

@@ -13,15 +13,13 @@ from hypothesis import strategies as st
 
 from edge.decide.verify import integers_of
 from edge.errors import InputError
-from edge.touch.cells import Cells
-from edge.touch.contact import feature_types
-from edge.touch.feature import PAPER
-from edge.touch.features import feature_vector
+from edge.features.cells import Cells
+from edge.features.names import PAPER, feature_types, names
+from edge.features.vector import feature_vector
+from edge.features.zones import ZONES
 from edge.touch.frame import Frame
 from edge.touch.layout import SkinLayout
-from edge.touch.measures import ZONES, names
-from edge.touch.zones import quantities
-from tests.edge.touch.pressed import active_of, followed, pressed, zones_of
+from tests.edge.touch.pressed import active_of, followed, pressed, quantities, zones_of
 
 FLAT = SkinLayout(5, 7, threshold_counts=10, onset_counts=10, counts_per_newton=100.0)
 ROUND = replace(FLAT, wraps=True)
@@ -96,7 +94,7 @@ def test_the_largest_skin_full_of_the_largest_counts_does_not_overflow(wraps):
     sums = (side * side, row, row, squares, line * line, squares)
     zones = zones_of(layout, frame, ["skin_length"])
     assert zones["skin"][2:] == [65535 * v for v in sums]
-    values = quantities(np.array([zones["skin"]]), layout)
+    values = quantities([zones["skin"]], layout)
     spread = np.sqrt((side**2 - 1) / 12)
     assert values["spread_along"] == pytest.approx(spread, rel=1e-15)
     assert values["slant"] == 0.0
@@ -157,7 +155,7 @@ def test_moments_are_those_of_exact_arithmetic(seed, density):
     above = counts > 10
     exact = moments(np.c_[np.argwhere(above), counts[above]].tolist())
     exact["force"] = counts[above].sum() / 100
-    # The determinant of a thin contact cancels: see `edge.touch.features`.
+    # The determinant of a thin contact cancels: see `edge.features.vector`.
     width = pytest.approx(float(exact.pop("width")), abs=7 * 2.0**-25)
     assert value(FLAT, counts, "skin_width") == width
     for quantity, truth in exact.items():
@@ -174,7 +172,7 @@ def test_moments_beyond_64_bits_are_exact(far):
     force squared is up to 2^66."""
     near = 1024 * far
     sums = [near, 2, near + far, 1024 * far, 0, 2**20 * far, 0, 0]
-    values = quantities(np.array([sums]), SkinLayout(2000, 4, wraps=False))
+    values = quantities([sums], SkinLayout(2000, 4, wraps=False))
     variance = Fraction(2**20 * near * far, (near + far) ** 2)
     assert values["spread_along"][0] == pytest.approx(math.sqrt(variance), rel=1e-15)
 

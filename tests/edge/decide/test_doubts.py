@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from edge.touch.doubts import frame_doubts
+from edge.decide.doubts import frame_doubts
 from edge.touch.layout import SkinLayout
 from tests.edge.touch.pressed import followed, pressed
 

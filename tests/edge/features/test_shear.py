@@ -10,13 +10,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from edge.errors import InputError
-from edge.touch import shear
-from edge.touch.features import feature_vector
+from edge.features.quantities import OF_ZONES
+from edge.features.vector import feature_vector
+from edge.features.zones import SHEAR_WIDTH, ZONE_WIDTH, ZONES
 from edge.touch.frame import Frame
 from edge.touch.layout import SkinLayout
-from edge.touch.measures import SHEAR, ZONES
-from edge.touch.zones import ZONE_WIDTH
-from tests.edge.touch.pressed import active_of, followed, zones_of
+from tests.edge.touch.pressed import active_of, followed, quantities, zones_of
 
 THRESHOLD = 10
 LAYOUT = SkinLayout(
@@ -27,8 +26,13 @@ LAYOUT = SkinLayout(
     pitch_m=(0.01, 0.02),
     axes=3,
 )
-ALL = [f"{zone}_{quantity}" for zone in ZONES for quantity in SHEAR]
-WIDTH = ZONE_WIDTH + shear.WIDTH
+ALL = [
+    f"{zone}_{quantity}"
+    for zone in ZONES
+    for quantity in OF_ZONES
+    if "shear" in quantity
+]
+WIDTH = ZONE_WIDTH + SHEAR_WIDTH
 
 
 def sheared_frame(seed, shape, high=32767, t=0.0) -> Frame:
@@ -68,11 +72,6 @@ def test_sums_are_those_of_plain_loops(seed, wraps, shape):
         assert zones[zone][ZONE_WIDTH:] == plain_sums(layout, frame, zone)
 
 
-def quantities_of(row: list[int]) -> dict[str, float]:
-    values = shear.quantities(np.array([row]), LAYOUT)
-    return {name: float(value[0]) for name, value in values.items()}
-
-
 @settings(max_examples=60)
 @given(seed=st.integers(0, 1 << 32))
 def test_quantities_are_those_of_fractions(seed):
@@ -82,20 +81,17 @@ def test_quantities_are_those_of_fractions(seed):
     row = zones_of(LAYOUT, frame, ALL)["skin"]
     force = row[2]
     along, around = row[ZONE_WIDTH:]
-    quantities = quantities_of(row)
-    assert quantities["shear_along"] == along / 100.0
-    assert quantities["shear_around"] == around / 100.0
+    values = quantities([row], LAYOUT, shear=True)
+    assert values["shear_along"] == along / 100.0
+    assert values["shear_around"] == around / 100.0
     size = Fraction(along) ** 2 + Fraction(around) ** 2
-    assert quantities["shear_size"] == pytest.approx(
-        float(size) ** 0.5 / 100.0, rel=1e-15
-    )
-    assert quantities["shear_ratio"] == pytest.approx(
-        float(size) ** 0.5 / force, rel=1e-15
-    )
+    assert values["shear_size"] == pytest.approx(float(size) ** 0.5 / 100.0, rel=1e-15)
+    assert values["shear_ratio"] == pytest.approx(float(size) ** 0.5 / force, rel=1e-15)
 
 
 def test_an_empty_zone_has_no_shear():
-    assert set(quantities_of([0] * WIDTH).values()) == {0.0}
+    values = quantities([[0] * WIDTH], LAYOUT, shear=True).values()
+    assert not np.array([*values]).any()
 
 
 @pytest.mark.parametrize("wraps", [False, True])

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from edge.record.saving import save
-from edge.touch.thresholds import above, noise
+from edge.record.thresholds import above, noise
 
 QUIET = np.full((16, 24), 20, np.uint16)
 

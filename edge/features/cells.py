@@ -2,9 +2,7 @@
 apart."""
 
 import math
-from collections.abc import Callable, Collection
 from dataclasses import replace
-from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,6 +28,7 @@ class Cells:
     Attributes:
         side: taxels along a block's side; 1 where every taxel is a cell.
         count: number of cells, row by row.
+        width: values of a frame.
     """
 
     def __init__(self, layout: SkinLayout, most: int = MOST_CELLS) -> None:
@@ -41,6 +40,7 @@ class Cells:
         self._cols = np.arange(0, layout.cols, side)
         self._alive = np.flatnonzero(self._pooled(layout.alive))
         self.count = len(self._alive)
+        self.width = self.count
 
     def read(self, frame: Frame) -> Integers:
         """(count,) sums of a frame."""
@@ -55,23 +55,14 @@ class Cells:
 class ShearCells(Cells):
     """The same cells, and the tangential force on each."""
 
+    def __init__(self, layout: SkinLayout) -> None:
+        super().__init__(layout)
+        self.width = 2 * self.count
+
     def read(self, frame: Frame) -> Integers:
-        """(2 * count,) sums of a frame's shear along the rows, then around the
+        """(width,) sums of a frame's shear along the rows, then around the
         columns."""
         assert frame.shear is not None
         along, around = np.moveaxis(frame.shear, 2, 0)
         halves = [replace(frame, counts=along), replace(frame, counts=around)]
         return np.concatenate(list(map(super().read, halves)))
-
-
-KINDS: dict[str, Callable[[SkinLayout], Cells]] = {
-    "taxel_force": Cells,
-    "taxel_shear": ShearCells,
-    "taxel_kernels": partial(Cells, most=KERNEL_CELLS),
-}
-"""{quantity: the cells that it needs}."""
-
-
-def cells_for(layout: SkinLayout, quantities: Collection[str]) -> dict[str, Cells]:
-    """{quantity: its cells} of the quantities that need some."""
-    return {name: KINDS[name](layout) for name in KINDS if name in quantities}

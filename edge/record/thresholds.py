@@ -1,6 +1,10 @@
-"""Thresholds that suit a recording's own noise."""
+"""Doubts about a recording: thresholds that do not suit its own noise, and shear that
+stands still."""
 
 from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
 
 from edge.arrays import Counts, Floats
 
@@ -48,3 +52,11 @@ def doubt(
     return (
         f"{problem}; threshold_counts = {threshold} and onset_counts = {begin} would do"
     )
+
+
+def shear_doubt(shear: NDArray[np.int16]) -> str | None:
+    """A sentence on an axis that never changes; else None."""
+    changes = (shear != shear[0]).any(axis=(0, 1, 2))
+    if changes.all() or len(shear) < 2:
+        return None
+    return "its shear never changes along an axis; check that the sensor sends both"

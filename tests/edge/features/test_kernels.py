@@ -8,9 +8,8 @@ import pytest
 
 from edge.config import ConfigTable
 from edge.errors import InputError
-from edge.touch import kernels
-from edge.touch.features import feature_vector
-from edge.touch.kernels import (
+from edge.features import kernels
+from edge.features.kernels import (
     SAMPLES,
     KernelTable,
     channels_of,
@@ -20,6 +19,7 @@ from edge.touch.kernels import (
     shares,
     shifted,
 )
+from edge.features.vector import feature_vector
 from edge.touch.layout import SkinLayout
 from tests.edge.touch.pressed import followed, pressed
 

@@ -6,33 +6,8 @@ import numpy as np
 
 from edge.arrays import Array, Floats
 from edge.elementary import log
-from edge.touch.feature import Feature
+from edge.features.names import Feature
 from edge.touch.layout import SkinLayout
-
-FORCES = ("max_force", "force", "pressure", "taxel_force", "shear_size")
-"""Quantities whose logarithm takes the smallest force of a taxel in contact as
-floor."""
-MOTION_FLOOR = 0.1
-"""Motion that counts as noise of the centroid, in distances between rows."""
-
-
-def force_floor(layout: SkinLayout) -> float:
-    """The smallest force of a taxel in contact."""
-    return (layout.threshold_counts + 1) / (layout.counts_per_newton or 1.0)
-
-
-def length_floor(layout: SkinLayout) -> float:
-    """The shortest motion that is no noise."""
-    return MOTION_FLOOR * layout.pitch[0]
-
-
-def floor_of(feature: Feature, layout: SkinLayout) -> float:
-    """What is added to a feature before its logarithm is taken."""
-    if feature.quantity in FORCES:
-        return force_floor(layout)
-    if feature.quantity in ("motion", "force_motion"):
-        return length_floor(layout)
-    return 0.0 if feature.quantity == "stiffness" else 1.0
 
 
 def transformed(
@@ -42,10 +17,10 @@ def transformed(
 ) -> Array:
     """Samples (rows, times) after the transforms of their features, which are of one
     kind."""
-    floors = np.array([[floor_of(feature, layout)] for feature in group])
+    floors = np.array([[feature.quantity.floor(layout)] for feature in group])
     first = group[0]
     for transform in first.transforms:
-        values = _transformed(values, transform, floors, first.wide)
+        values = _transformed(values, transform, floors, first.quantity.wide)
         floors = np.ones_like(floors)
     return values
 
