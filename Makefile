@@ -279,6 +279,7 @@ constraints: $(VENV)/.upkeep
 # options of the program.
 CHECKS := accuracy faults flags fuzz hard-cases kills mutants remount risk shifts soak stopping \
   test-busy transfer
+.PHONY: $(CHECKS)
 ONLY ?= $(filter-out remount test-busy,$(CHECKS))
 
 flags transfer: $(BENCHVENV)

@@ -56,7 +56,7 @@ def test_each_table_names_its_command_commit_machine_and_date(name):
 
 @pytest.mark.parametrize("name", TABLES)
 def test_each_table_was_measured_at_a_commit_without_local_changes(name):
-    """Otherwise nobody can say what was measured: commit, then `make measured`."""
+    """Otherwise nobody can say what was measured: commit, then `make check`."""
     assert "-dirty" not in TABLES[name].splitlines()[0]
 
 

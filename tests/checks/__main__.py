@@ -168,9 +168,10 @@ def main(words=None):
     parser.add_argument("--out", default="build", help="folder of what is written")
     parser.add_argument("--data", nargs="+", default=[], help="folders of recordings")
     parser.add_argument("name", choices=CHECKS, metavar="NAME")
-    arguments, options = parser.parse_known_args(words)
+    parser.add_argument("options", nargs=argparse.REMAINDER)
+    arguments = parser.parse_args(words)
     steps = CHECKS[arguments.name](arguments.out, arguments.data)
-    steps[-1] = (*steps[-1], *options)
+    steps[-1] = (*steps[-1], *arguments.options)
     environment = os.environ | ENVIRONMENT.get(arguments.name, {})
     for step in steps:
         status = subprocess.run(step, env=environment, check=False).returncode
