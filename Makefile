@@ -6,18 +6,18 @@ READY := $(VENV)/.ready
 # Only errors: every editable installation prints a warning.
 PINNED := python -m pip install -qq --disable-pip-version-check -c
 PIP := $(BIN)/$(PINNED) constraints.txt
+# uv installs in a third of the time; pip does where uv cannot be had or finds no registry.
+INSTALL = $(BIN)/python -m uv pip install --quiet -c constraints.txt $(1) || $(PIP) $(1)
 # Several threads slow down matrices as small as ours, and disturb the processes beside them.
 export OPENBLAS_NUM_THREADS := 1
 
-.PHONY: help venv test test-all test-busy lint types export demo demo-data golden study tradeoff wheel wheel-test \
-  board-test browser-test c-test kernel-test peers-test service-test hard-cases hard-cases-versions mutants fuzz kills accuracy bench transfer remount docs faults flags risk shifts \
-  stopping soak scale measured constraints clean
+.PHONY: help venv test test-all lint types export demo demo-data golden study tradeoff wheel wheel-test \
+  board-test browser-test c-test kernel-test peers-test service-test bench docs constraints check clean
 
 help:
 	@echo "Everyday"
 	@echo "  make test          lint, types and the fast tests"
 	@echo "  make test-all      the slow tests too, as CI runs them"
-	@echo "  make test-busy     the fast tests five times beside eight busy processes"
 	@echo "  make export        fit a model to DATA (a folder of recordings; default: simulated ones)"
 	@echo "                     and write model.onnx, golden.npz and report.html to OUT (default:"
 	@echo "                     build); NAME=... names the model; C=DIR writes it in C99 too;"
@@ -38,25 +38,11 @@ help:
 	@echo "  make peers-test    the kernels beside aeon's MiniRocket"
 	@echo "  make service-test  start, hang and restart the service under a systemd of its own (root)"
 	@echo "  make requirements-board.txt   pin the board's packages with hashes"
-	@echo "Measurements"
-	@echo "  make accuracy      the accuracies that export prints, of simulated and (GRASPS=folder) real sets, and of peers"
+	@echo "Rarely"
 	@echo "  make bench         speed beside the alternatives"
-	@echo "  make transfer      score a model of SCENE on trials from another engine (MuJoCo)"
-	@echo "  make faults        the cost of each fault on the skin's wires, as a table"
-	@echo "  make scale         processor time, memory and size of the model by the number of recordings"
-	@echo "  make risk          how often certified errors, mean times and FRONT's intervals are not kept"
-	@echo "  make shifts        what touches unlike the training do to answers, and whether doubt tells it"
-	@echo "  make flags         are answers with a flag more often wrong? FLAGS=\"--recordings folders\" of a real skin"
-	@echo "  make remount       grasps of a real hand (REMOUNT=\"folders\") after it was taken off and put on"
-	@echo "  make stopping      deciding when sure beside fixed windows and extra trees"
-	@echo "  make soak          ten minutes of the loop in virtual time, and load on its page"
-	@echo "  make measured      all tables of docs/measured anew, one after another; ONLY=\"risk kills\""
-	@echo "Thorough tests"
-	@echo "  make hard-cases    the cost of each hard numerical case to us and to the usual tools"
-	@echo "  make hard-cases-versions   the same answers from other ONNX Runtimes"
-	@echo "  make mutants       make 200 random changes to the skin, labels, page and C: is each noticed?"
-	@echo "  make fuzz          read 5,000 damaged files of each kind: no crash, no traceback, small memory"
-	@echo "  make kills         kill each command that writes files 60 times: none is damaged"
+	@echo "  make check         programs that measure and thorough tests, with a table each in"
+	@echo "                     docs/measured; ONLY=\"risk kills\" some of them; make risk"
+	@echo "                     ARGS=--help one; python -m tests.checks --help lists them"
 	@echo "Upkeep"
 	@echo "  make golden        renew the small model and outputs that the tests compare with"
 	@echo "  make demo-data     renew the model and the touches that the wheel carries"
@@ -66,14 +52,14 @@ help:
 # What `make demo` and `make export` need; what a target needs beyond that, it installs itself.
 $(READY): pyproject.toml constraints.txt
 	$(PYTHON) -m venv $(VENV)
-	$(PIP) "pip>=25.1"
-	$(PIP) -e . --group train
+	-$(PIP) "pip>=25.1" uv
+	@$(call INSTALL,-e . --group train)
 	@touch $@
 
 DEV := $(VENV)/.dev
 
 $(DEV): $(READY)
-	$(PIP) --group dev
+	@$(call INSTALL,--group dev)
 	@touch $@
 
 venv: $(READY)
@@ -93,9 +79,6 @@ test: lint types
 
 test-all: lint types
 	$(PYTEST) $(TESTS)
-
-test-busy: $(DEV)
-	$(BIN)/python -m tests.checks.busy $(PYTEST) -m "not slow" $(TESTS)
 
 # The recordings to fit: DATA, or the simulated default set.
 SCENE := train/scenes/cody18.toml
@@ -142,7 +125,7 @@ FRONTED := --front $(FRONT) --fronts $(or $(FRONTS),$(OUT)/tradeoff/front.json)
 endif
 
 $(VENV)/.cluster: $(READY)
-	$(PIP) --group cluster
+	@$(call INSTALL,--group cluster)
 	@touch $@
 
 export: $(READY) $(if $(CLUSTER),$(VENV)/.cluster)
@@ -171,11 +154,6 @@ docs/tradeoff.png: tradeoff
 	cp $(OUT)/tradeoff/tradeoff.png $@
 	$(BIN)/python -m tests.checks.bench.tables tradeoff "make tradeoff" $(OUT)/tradeoff/answer_*.csv
 
-# The tables of docs/measured.md that a report has measured.
-docs/measured/study.md: STUDY := --seeds 8
-docs/measured/study.md: study
-	$(BIN)/python -m tests.checks.bench.tables study 'make study STUDY="$(STUDY)"' $(OUT)/study/headline.csv
-
 docs/touches.png docs/touches-dark.png: $(READY)
 	$(BIN)/python -m train show edge/demo/*.npz --model edge/demo/model.onnx \
 	  $(if $(findstring dark,$@),--dark) --out $@
@@ -187,21 +165,13 @@ docs/touch.png: $(READY)
 BENCHVENV := $(VENV)/.bench
 
 $(BENCHVENV): $(DEV)
-	$(PIP) --group bench
+	@$(call INSTALL,--group bench)
 	@touch $@
 
 # BENCH="-k region": only the benchmarks whose names contain this.
 bench: $(BENCHVENV)
 	$(BIN)/python -m pytest tests/checks/bench -o python_files='bench_*.py' -o python_functions='bench_*' \
 	  -o filterwarnings=default $(BENCH)
-
-HELD := $(OUT)/transfer
-
-transfer: SCENE := train/scenes/household.toml
-transfer: $(BENCHVENV)
-	$(BIN)/python -m train simulate $(SCENE) --out $(HELD)/simulated
-	$(BIN)/python -m export --data $(HELD)/simulated --out $(HELD)/household $(EXPORT)
-	$(BIN)/python -m tests.checks.bench.transfer --model $(HELD)/household/model.onnx $(TRANSFER)
 
 ifndef DATA
 study tradeoff: $(SIMULATED)/.made
@@ -226,40 +196,11 @@ endif
 
 # The site, with the Python reference from the docstrings; a broken link is an error.
 $(VENV)/.docs: $(READY)
-	$(PIP) --group docs
+	@$(call INSTALL,--group docs)
 	@touch $@
 
 docs: $(VENV)/.docs
 	$(BIN)/python -m mkdocs build --quiet --strict --site-dir $(OUT)/site
-
-# SCALE="--repeats 5 80 357" goes to 10,000 recordings.
-scale: $(DEV)
-	$(BIN)/python -m tests.checks.bench.scale $(SCALE)
-
-risk: $(DEV)
-	$(BIN)/python -m tests.checks.bench.risk $(RISK)
-
-shifts: $(DEV) $(SIMULATED)/.made
-	$(BIN)/python -m export --data $(SIMULATED) --out $(OUT)/shifts $(EXPORT)
-	$(BIN)/python -m tests.checks.bench.shifts --model $(OUT)/shifts/model.onnx
-
-flags: $(BENCHVENV)
-	$(BIN)/python -m tests.checks.bench.flags $(FLAGS)
-
-# Each folder of DATA is a data set of its own; by default five seeds of the scene, with 140
-# trials each and with 560: STOPPING_TRIALS of each object in each condition.
-STOPPING_TRIALS ?= 5 20
-ifdef DATA
-STOPPED := $(DATA)
-else
-STOPPED := $(foreach trials,$(STOPPING_TRIALS),$(foreach seed,2012 2013 2014 2015 2016,\
-  $(OUT)/stopping/$(trials)/$(seed)))
-stopping: $(addsuffix /.made,$(STOPPED))
-endif
-
-$(OUT)/stopping/%/.made: $(READY) $(SCENE)
-	$(BIN)/python -m train simulate $(SCENE) --trials $(*D) --seed $(*F) --out $(@D)
-	@touch $@
 
 # An environment of its own: aeon 1.6.0 does not take the numpy and pandas that
 # constraints.txt pins.
@@ -272,41 +213,11 @@ $(PEERS)/.ready: pyproject.toml constraints.txt
 	$(PEERS)/bin/$(PINNED) $(PEERS)/constraints.txt -e . --group peers
 	@touch $@
 
-accuracy: $(PEERS)/.ready
-	$(PEERS)/bin/python -m tests.checks.bench.accuracy $(if $(GRASPS),--grasps "$(GRASPS)")
-
 peers-test: $(PEERS)/.ready
-	$(PEERS)/bin/python -m pytest tests/edge/touch/test_kernels.py -k aeon -rs
-
-stopping: $(DEV)
-	$(BIN)/python -m tests.checks.bench.stopping --data $(STOPPED) $(STOPPING)
-
-# REMOUNT="icub sdh2": folders of imported grasps.
-remount: $(DEV)
-	$(BIN)/python -m tests.checks.remount --recordings $(REMOUNT)
-
-# FAULTS="--every 10": every tenth position.
-faults: $(DEV)
-	$(BIN)/python -m tests.checks.faults $(FAULTS)
-
-soak: $(DEV)
-	$(BIN)/python -m tests.checks.bench.soak $(SOAK)
-
-# Every table of docs/measured, one target after another, with a line for each as it ends. The
-# tables that this writes are no local change.
-ONLY ?= accuracy bench flags hard-cases kills risk shifts soak stopping transfer \
-  docs/tradeoff.png
-measured: $(DEV)
-	@test -z "`git status --porcelain -uno -- . ':!docs/measured' ':!docs/*.png'`" || \
-	  { echo "commit the local changes first: a table names its commit" >&2; exit 1; }
-	@mkdir -p $(OUT)/measured; failed=0; for name in $(ONLY); do \
-	  began=`date +%s`; state=ok; log=$(OUT)/measured/`basename $$name`.log; \
-	  $(MAKE) $$name > $$log 2>&1 || { state=failed; failed=1; }; \
-	  echo "$$name `expr \`date +%s\` - $$began` s $$state"; \
-	done; exit $$failed
+	$(PEERS)/bin/python -m pytest tests/edge/features/test_kernels.py -k aeon -rs
 
 $(VENV)/.upkeep: $(READY)
-	$(PIP) --group upkeep
+	@$(call INSTALL,--group upkeep)
 	@touch $@
 
 COMPILE = $(BIN)/uv pip compile pyproject.toml --quiet --no-annotate -c constraints.txt
@@ -325,16 +236,17 @@ wheel-test: $(DEV) wheel
 	$(BIN)/python -m pytest tests/board/test_wheel.py
 
 c-test: $(DEV)
-	$(BIN)/python -m pytest tests/export/test_c_code.py tests/export/test_c_graph.py -rs
+	$(BIN)/python -m pytest tests/export/test_c_code.py tests/export/test_c_graph.py \
+	  tests/export/test_skin_code.py -rs
 
 kernel-test: $(DEV)
 	$(BIN)/python -m pytest tests/board/test_kernel.py -rs --capture=tee-sys
 
 $(VENV)/.browser: $(DEV)
-	$(PIP) --group browser
+	@$(call INSTALL,--group browser)
 	@touch $@
 
-BROWSED := tests/edge/app/sinks/test_page_in_a_browser.py tests/train/tradeoff/test_slider.py \
+BROWSED := tests/edge/app/sinks/test_page_in_a_browser.py \
   tests/train/report/test_page.py tests/train/study/test_study_report.py tests/test_site.py
 
 browser-test: $(VENV)/.browser $(VENV)/.docs
@@ -356,37 +268,9 @@ demo-data: $(READY)
 		--features paper --projection pca --tasks category mobility object --name demo
 	PYTHONPATH=. $(BIN)/python tests/board/demo_data.py $(DEMODATA)
 
-HARD := $(OUT)/hard-cases
-
-# Includes the answers of another ONNX Runtime.
-hard-cases: hard-cases-versions
-	$(BIN)/python -m tests.checks.hard_cases
-
-# Writes golden files of the hard cases, then checks them with other ONNX Runtimes.
-OTHER_RUNTIMES ?= 1.22.1 1.26.0 1.32.0
-OTHERS := $(OTHER_RUNTIMES:%=$(HARD)/onnxruntime-%)
-ELSEWHERE = -m pip install --quiet --disable-pip-version-check \
-  $$(grep -E '^(numpy|smbus2)==' constraints.txt)
-
-$(OTHERS:%=%/.ready): $(HARD)/onnxruntime-%/.ready: constraints.txt
-	$(PYTHON) -m venv $(@D)
-	$(@D)/bin/python $(ELSEWHERE) onnxruntime==$*
-	@touch $@
-
-hard-cases-versions: $(DEV) $(OTHERS:%=%/.ready)
-	$(BIN)/python -m tests.checks.hard_cases.golden --out $(HARD)/golden
-	for other in $(OTHERS); do \
-	  $(BIN)/python -m tests.checks.hard_cases.elsewhere --golden $(HARD)/golden $$other/bin/python \
-	  || exit 1; done
-
 $(VENV)/.mutants: $(DEV)
-	$(PIP) --group mutants
+	@$(call INSTALL,--group mutants)
 	@touch $@
-
-# MUTANTS="--only edge.touch --count 50 --minutes 5": a smaller draw. mutmut forks, and worker
-# processes that were started before a fork answer nobody.
-mutants: $(VENV)/.mutants
-	LOKY_MAX_CPU_COUNT=1 $(BIN)/python -m tests.checks.mutants $(MUTANTS)
 
 # The lines that differ are missing pins (<) and pins that nothing needs (>).
 GROUPS := train cluster dev docs browser mutants bench upkeep
@@ -396,13 +280,26 @@ constraints: $(VENV)/.upkeep
 	tail -n +2 constraints.txt | diff $(VENV)/constraints.txt -
 	@echo "constraints.txt pins exactly what the groups need"
 
-# FUZZ="-k scene": only the readers whose names contain this.
-fuzz: $(DEV)
-	FUZZ_FILES=5000 $(BIN)/python -m pytest tests/checks/fuzz -n 2 -v $(FUZZ)
+# What is rare. `make check ONLY="risk kills"` goes on after one that fails; ARGS="--count 10" are
+# options of the program.
+CHECKS := accuracy faults flags fuzz hard-cases kills mutants remount risk scale shifts soak stopping \
+  test-busy transfer
+.PHONY: $(CHECKS)
+ONLY ?= $(filter-out remount test-busy,$(CHECKS))
 
-# KILLS="--count 10 --only install": fewer of them.
-kills: $(DEV)
-	$(BIN)/python -m tests.checks.kills $(KILLS)
+flags transfer: $(BENCHVENV)
+mutants: $(VENV)/.mutants
+accuracy: $(PEERS)/.ready
+
+$(CHECKS): $(DEV)
+	$(BIN)/python -m tests.checks --out $(OUT) $(if $(DATA),--data $(DATA) --) $@ $(ARGS)
+
+check: $(DEV)
+	@mkdir -p $(OUT)/checks; failed=0; for name in $(ONLY); do \
+	  began=`date +%s`; state=ok; log=$(OUT)/checks/$$name.log; \
+	  $(MAKE) $$name > $$log 2>&1 || { state=failed; failed=1; }; \
+	  echo "$$name `expr \`date +%s\` - $$began` s $$state, see $$log"; \
+	done; exit $$failed
 
 clean:
 	rm -rf build dist mutants

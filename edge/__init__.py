@@ -19,11 +19,11 @@ if TYPE_CHECKING:
     from edge.decide.model import Model as Model
     from edge.errors import EdgeError as EdgeError
     from edge.errors import InputError as InputError
+    from edge.features.vector import feature_vector as feature_vector
     from edge.record.recording import Recording as Recording
     from edge.record.recording import load as load
     from edge.record.saving import save as save
     from edge.touch.arm import Chain as Chain
-    from edge.touch.features import feature_vector as feature_vector
     from edge.touch.region import find_regions as find_regions
     from edge.touch.region import largest_region as largest_region
     from edge.wire.skin.skin import Skin as Skin
@@ -39,7 +39,7 @@ _PUBLIC = {
     "edge.record.saving": ["save"],
     "edge.wire.skin.skin": ["Skin"],
     "edge.touch.arm": ["Chain"],
-    "edge.touch.features": ["feature_vector"],
+    "edge.features.vector": ["feature_vector"],
     "edge.touch.region": ["find_regions", "largest_region"],
 }
 __all__ = sorted(name for names in _PUBLIC.values() for name in names)

@@ -24,7 +24,7 @@ from train.data.dataset import DataSet
 from train.data.groups import TRIAL
 from train.data.labels import NO_CONTACT
 from train.data.usual import usual_touches
-from train.fitting import Fitted
+from train.fitted import Fitted
 from train.model.pipeline import ContactClassifier
 from train.report.summary import names
 
@@ -135,7 +135,7 @@ def _task(fitted: Fitted, task: str) -> Task:
         accuracy=0.0 if chosen is None else chosen.accuracy.accuracy,
         projection=choice.projection,
         features=tuple(n for n in fitted.dataset.names if n in choice.features),
-        left_out=TRIAL if chosen is None else chosen.left_out,
+        left_out=TRIAL if chosen is None else chosen.held_out,
         no_contact=NO_CONTACT if NO_CONTACT in labels else None,
         factors=classifier.products_.get(task, {}),
     )

@@ -15,18 +15,17 @@ from pathlib import Path
 import numpy as np
 
 from edge.arrays import Array, Floats
+from edge.decide.doubts import GAP_S, PERIODS
 from edge.decide.early import stopping_rules
 from edge.decide.info import ModelInfo, Novelty, Remoteness, StoppingRule
 from edge.decide.model import Model
 from edge.elementary import log, logistic, sin
 from edge.errors import InputError
-from edge.touch import measures, transforms
-from edge.touch.cells import KERNEL_CELLS, Cells
-from edge.touch.contact import feature_types
-from edge.touch.doubts import GAP_S, PERIODS
-from edge.touch.kernels import BIASES, CONVOLUTIONS, KernelTable, mixes
+from edge.features.cells import KERNEL_CELLS, Cells
+from edge.features.kernels import BIASES, CONVOLUTIONS, KernelTable, mixes
+from edge.features.names import feature_types, zones_of
+from edge.features.quantities import ALONE, OF_ZONES, force_floor, length_floor
 from edge.touch.layout import SkinLayout
-from edge.touch.zones import Zones
 from edge.writing import write_whole
 from export.c_graph import CompiledGraph, Step
 
@@ -55,8 +54,6 @@ LARGEST = 2**63
 """No product of a frame's sums may reach it."""
 MOST_SUMMED = 128
 """Samples beyond which numpy sums up in halves."""
-ALONE = {*measures.ALONE.values(), ("contact", "area")} - {("skin", "stiffness")}
-"""(zone, quantity) that need no sums of a zone."""
 TYPE_OF = {"palette": "uint8", "packed": "uint8"}
 """The types of tables that are no types of C."""
 PROBE = 0.3
@@ -150,12 +147,13 @@ class Source:
         self._types = feature_types(model.info.features)
         windows_s = model.decision_points_s
         self._last = len(windows_s) if error is not None else 1
-        self._zones = Zones(self._layout, self._types).names
+        self._zones = zones_of(self._types)
         self.values: dict[str, object] = {
             "early": error is not None,
             "windows_s": windows_s[-self._last :],
             "long_step_s": LONG_STEP_S,
             "repeats": int(model.info.repeats),
+            **quantities_in_c(),
             "long_steps": int(model.info.window_s / LONG_STEP_S) + 2,
         }
         for owner, names in ((self._layout, OF_LAYOUT), (self._info, OF_INFO)):
@@ -188,12 +186,7 @@ class Source:
             values[name] = literal(value)
             if isinstance(value, Sized):
                 values[f"{name}_count"] = str(len(value))
-        with ExitStack() as files:
-            for room in ROOMS.iterdir():
-                text = string.Template(room.read_text()).substitute(values)
-                file = files.enter_context(write_whole(folder / room.name))
-                file.write(text.encode())
-                file.flush()
+        write_rooms(ROOMS, folder, values)
 
     def _features(self) -> int:
         """The `ec_course` and the `ec_feature` of each feature, and the tables of the
@@ -206,12 +199,10 @@ class Source:
             samples = feature.samples or self._info.samples
             sums_up = feature.summary not in ("", "rate")
             count = width if sums_up else width // samples
-            alone = (feature.zone, feature.quantity) in ALONE
-            of_region = "REGION_" * (alone and feature.zone == "contact")
-            quantity = f"EC_Q_{of_region}{feature.quantity.upper()}"
-            zone = 0 if alone else self._zones.index(feature.zone)
-            course = samples, count, zone, quantity.replace("CHANGE", "ANGLE")
-            if feature.kernels:
+            quantity = feature.quantity
+            zone = 0 if quantity.zone else self._zones.index(feature.zone)
+            course = samples, count, zone, quantity.code.replace("CHANGE", "ANGLE")
+            if quantity.kernels:
                 self.work["convolution"] += CONVOLUTIONS
             elif course not in courses:
                 courses[course] = len(courses)
@@ -220,11 +211,11 @@ class Source:
                 together = count if "relative" in feature.transforms else 1
                 summed = max(summed, samples * together)
             roots = {"log", "sqrt"}.intersection(feature.transforms)
-            self.work["root"] += (samples * count * len(roots)) * (not feature.kernels)
+            self.work["root"] += (samples * count * len(roots)) * (not quantity.kernels)
             row = [
-                transforms.floor_of(feature, self._layout),
+                quantity.floor(self._layout),
                 courses.get(course, 0),
-                quantity,
+                quantity.code,
                 [f"EC_T_{kind.upper()}" for kind in feature.transforms],
                 f"EC_S_{feature.summary.upper()}",
             ]
@@ -242,7 +233,9 @@ class Source:
     def _skin(self) -> None:
         """The skin, and what is measured in every frame."""
         layout = self._layout
-        quantities = {feature.quantity for feature in self._types}
+        used = [feature.quantity for feature in self._types]
+        quantities = {quantity.name for quantity in used}
+        motions = {quantity.motion for quantity in used}
         cells = Cells(layout)
         kernel_cells = Cells(layout, KERNEL_CELLS)
         pooled = cells.count * ("taxel_force" in quantities)
@@ -259,10 +252,10 @@ class Source:
             "kernel_cells": pooled_for_kernels,
             "zone_channels": zone_channels,
             "channels": zone_channels + pooled_for_kernels,
-            "motion": "motion" in quantities,
+            "motion": "motion" in motions,
             "centroids": not quantities.isdisjoint(("along", "around")),
-            "spreads": not quantities.isdisjoint(measures.QUANTITIES[6:]),
-            "force_motion": not quantities.isdisjoint(("force_motion", "stiffness")),
+            "spreads": any("SPREAD" in (quantity.c or "") for quantity in used),
+            "force_motion": "force_motion" in motions,
             "zone_names": [f"EC_{name.upper()}" for name in (*self._zones, "no_zone")],
             "cell_of_taxel": _of_taxels(layout, cells) if pooled else (),
             "kernel_cell_of_taxel": (
@@ -289,8 +282,8 @@ class Source:
             "along": along,
             "around": around,
             "scale": float(layout.counts_per_newton or 1.0),
-            "force_floor": transforms.force_floor(layout),
-            "length_floor": transforms.length_floor(layout),
+            "force_floor": force_floor(layout),
+            "length_floor": length_floor(layout),
             "column_angles": len(angles) > 1,
             "alive": layout.alive.reshape(-1),
             "angles": zip(angles, steps, strict=True),
@@ -403,6 +396,16 @@ class Source:
         self.values |= {"naming": naming, "calibrated": info.novelty is not None}
 
 
+def write_rooms(rooms: Path, folder: Path, values: Mapping[str, str]) -> None:
+    """Write all files of C of a folder with these values, whole or not at all."""
+    with ExitStack() as files:
+        for room in rooms.glob("*.[ch]"):
+            text = string.Template(room.read_text()).substitute(values)
+            file = files.enter_context(write_whole(folder / room.name))
+            file.write(text.encode())
+            file.flush()
+
+
 def checksum(model: Model) -> int:
     """What `ec_selftest` in `export/c/decide.c` compares: FNV-1a of elementary functions
     and of the outputs for features that are all `PROBE`, at the full window."""
@@ -445,6 +448,15 @@ def quoted(text: str) -> str:
     return '"' + SPECIAL.sub(lambda match: f"\\{ord(match[0]):03o}", letters) + '"'
 
 
+def quantities_in_c() -> dict[str, str]:
+    """The names of all quantities, and the cases of `sure_value` in
+    `export/c/samples.c`."""
+    quantities = [*ALONE.values(), *OF_ZONES.values()]
+    cases = [f"case {of.code}: return {of.c};" for of in quantities if of.c]
+    names = ", ".join(of.code for of in quantities)
+    return {"quantity_names": names, "sure_values": " \\\n  ".join(cases)}
+
+
 def lacks(info: ModelInfo) -> Iterable[str]:
     """What C lacks for a model, as sentences."""
     layout = info.layout
@@ -456,6 +468,8 @@ def lacks(info: ModelInfo) -> Iterable[str]:
     if (total * max(2 * layout.cols, layout.rows)) ** 2 >= LARGEST:
         yield f"the sums of {layout.rows} x {layout.cols} taxels exceed 64 bits"
     for feature in feature_types(info.features):
+        if feature.quantity.c is None:
+            yield f"it measures no {feature.quantity.name}"
         samples = feature.samples or info.samples
         if feature.summary not in ("", "rate") and samples > MOST_SUMMED:
             yield f"{feature.name} sums up more than {MOST_SUMMED} samples"

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 import os
-import re
 import sys
 from collections.abc import Sequence
 from functools import cache, partial
@@ -12,7 +11,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from joblib import cpu_count
 
 from edge.app.cli import dispatch
 from edge.app.commands.replay import Summary, compared, decide
@@ -21,205 +19,35 @@ from edge.app.trial_options import add_arm, open_arm
 from edge.decide.classifier import suited
 from edge.decide.model import Model
 from edge.errors import InputError
+from edge.features.vector import WINDOW_S
 from edge.record.labels import read_table
 from edge.record.recording import load
 from edge.record.saving import find, listed
 from edge.record.slips import counts_text
-from edge.touch import measures
-from edge.touch.features import WINDOW_S
+from edge.touch.layout import for_device
+from edge.wire.skin import file as skinfile
 from edge.writing import check_writable
-from train.choose.choose import SECOND_WORTH
+from train.choose.options import (
+    DECISION_POINTS,
+    LONGEST_S,
+    OF_COMMAND,
+    FitOptions,
+    add_options,
+    count,
+)
 from train.data.dataset import read
-from train.data.feature_sets import SETS
-from train.data.groups import LEAVE_OUT, TRIAL
-from train.fitting import Fitted, fit
-from train.model.projection import KINDS
-from train.model.scaling import SCALINGS
-from train.model.stopping import FEWEST
-from train.report.summary import summary
+from train.fitted import Fitted
+from train.fitting import fit
+from train.report.summary import Prices, details, summary
 from train.threads import on_cluster, single_thread
 from train.tradeoff import front as fronts
 
-FIXED = ("features", "projection", "scaling", "components", "k", "window", "tasks")
+FIXED = ("features", "projection", "scaling", "components", "k", "window_s", "tasks")
 """Options that would make another model than the one that a point was measured with."""
-FORWARDED = (
-    "features projection scaling components k tasks leave_out threshold onset "
-    "release dead jobs second_worth skip_damaged"
-).split()
-"""Options that `fit` takes as they are."""
-DECISION_POINTS = "0.2:1.2:0.1"
-LONGEST_S = 60.0
-"""Longest window, and longest time that a contact may be away."""
-count = within(int, 1, 1_000_000)
-counts = within(int, 0, 65534)
-seconds = within(float, 0.01, LONGEST_S)
-"""The types of options that take a number of things, counts of a taxel, or seconds."""
-
-
-def taxel(text: str) -> tuple[int, int]:
-    """The row and column of a taxel.
-
-    Raises:
-        ArgumentTypeError: the text is no taxel.
-    """
-    place = re.fullmatch(r"([0-9]{1,4}),([0-9]{1,4})", text)
-    if place is None:
-        raise argparse.ArgumentTypeError(
-            f"must be ROW,COL, such as 3,5, not {text[:40]!r}"
-        )
-    return int(place[1]), int(place[2])
-
-
-OPTIONS: dict[str, dict[str, Any]] = {
-    # The recordings, the model and its tasks, and the settings that can be held fixed.
-    "--data": {
-        "nargs": "+",
-        "required": True,
-        "metavar": "REC",
-        "help": ".npz recordings or folders",
-    },
-    "--skip-damaged": {
-        "action": "store_true",
-        "help": "name the recordings that cannot be read, and go on without them",
-    },
-    "--out": {
-        "type": Path,
-        "default": Path("build"),
-        "help": "folder (default: %(default)s)",
-    },
-    "--name": {
-        "help": "of the model (default: that of the folder of the recordings)",
-    },
-    "--tasks": {
-        "nargs": "+",
-        "metavar": "TASK",
-        "help": "only these keys of the labels",
-    },
-    "--features": {
-        "nargs": "+",
-        "metavar": "NAME",
-        "help": f"the features to measure, instead of a choice: sets ({', '.join(SETS)}) and "
-        f"single features, ZONE_QUANTITY of {', '.join(measures.ZONES)} and "
-        f"{', '.join(measures.QUANTITIES)}, or {', '.join(measures.ALONE)}",
-    },
-    "--projection": {
-        "choices": KINDS,
-        "help": "fix the projection: principal components or discriminants",
-    },
-    "--scaling": {
-        "choices": SCALINGS,
-        "help": "fix the scaling (paper, Eqs. 1 to 5; or by column)",
-    },
-    "--components": {
-        "type": count,
-        "help": "fix the number of principal components",
-    },
-    "-k --k": {
-        "type": count,
-        "help": "fix the number of neighbours",
-    },
-    # How the others are chosen, and at which times.
-    "--leave-out": {
-        "default": LEAVE_OUT,
-        "metavar": "KEY",
-        "help": "choose and score a task with entire groups of this label held out, if each of its "
-        f"classes has several groups (default: {LEAVE_OUT}); `{TRIAL}` leaves out "
-        "single trials",
-    },
-    "--quick": {
-        "action": "store_true",
-        "help": "for a first look: few candidates, five folds",
-    },
-    "--window": {
-        "type": seconds,
-        "help": "seconds from onset that a decision is based on (default: "
-        f"{WINDOW_S:g}, or more if touches last longer and the gain is worth the wait)",
-    },
-    "--second-worth": {
-        "type": within(float, 0.0, 1.0),
-        "default": SECOND_WORTH,
-        "help": "accuracy that a second of waiting is worth where the window is chosen "
-        "(default: %(default)g)",
-    },
-    "--decision-points": {
-        "metavar": "A:B:STEP",
-        "help": "calibrate decisions before the full window (edge-classify run --error), at these "
-        "seconds from onset, or at a list a,b,c, or `none` (default: "
-        f"{DECISION_POINTS} from {FEWEST} trials on, and fewer points if the model would "
-        "exceed 1.9 MB)",
-    },
-    "--threshold": {
-        "type": counts,
-        "help": "counts above which a taxel is in contact",
-    },
-    "--onset": {
-        "type": counts,
-        "help": "counts above which a contact begins",
-    },
-    "--release": {
-        "type": seconds,
-        "help": "seconds that a contact may be away and go on (default: the skin's, or longer "
-        "if many touches are felt in pieces and that is much more accurate)",
-    },
-    "--dead": {
-        "nargs": "+",
-        "type": taxel,
-        "default": (),
-        "metavar": "ROW,COL",
-        "help": "taxels that are left out, counted from 0, as they are broken",
-    },
-    # The point of `make tradeoff`, the arm, and the files that are written or scored.
-    "--front": {
-        "metavar": "WHAT",
-        "help": "the choice at the window of a point of `make tradeoff`: fast, balanced, "
-        "accurate, milliseconds to decide within, or an accuracy (0 to 1) to reach",
-    },
-    "--fronts": {
-        "type": Path,
-        "metavar": "front.json",
-        "default": Path("build/tradeoff/front.json"),
-        "help": "the file with the points (default: %(default)s)",
-    },
-    "--report": {
-        "action": "store_true",
-        "help": "also write OUT/report.html, as `make export` does",
-    },
-    "--test": {
-        "nargs": "+",
-        "metavar": "REC",
-        "help": "recordings that are scored and never fitted, such as those of another day",
-    },
-    "--compare": {
-        "metavar": "old.onnx",
-        "help": "a former model.onnx, which is scored on the --test recordings too",
-    },
-    "--jobs": {
-        "type": count,
-        "default": cpu_count(),
-        "help": "processes (default: all cores)",
-    },
-    "--cluster": {
-        "metavar": "tcp://HOST:PORT",
-        "help": "a Dask scheduler, whose workers follow and fit",
-    },
-    # The model in C.
-    "--c": {
-        "type": Path,
-        "metavar": "DIR",
-        "help": "also write the model as C99 for a microcontroller, into this folder",
-    },
-    "--c-error": {
-        "type": within(float, 1e-6, 1.0 - 1e-6),
-        "metavar": "RATE",
-        "help": "with --c: decide early, wrongly at most this often (default: at the full window)",
-    },
-    "--flash": {
-        "type": count,
-        "metavar": "KB",
-        "help": "with --c: kB that it may take; early decisions are left out first",
-    },
-}
-"""{spellings of an option: how argparse takes it}."""
+MOST_LINES = 20
+"""Lines that an export prints without `--verbose`."""
+FILES = 4
+"""Of these, at most so many name files."""
 
 
 def parser() -> argparse.ArgumentParser:
@@ -230,9 +58,47 @@ def parser() -> argparse.ArgumentParser:
         "OUT/model.onnx and OUT/golden.npz. Options you give are held fixed. The "
         "others are chosen by cross-validation.",
     )
-    for names, settings in OPTIONS.items():
-        top.add_argument(*names.split(), **settings)
+    option = top.add_argument
+    text = ".npz recordings or folders"
+    option("--data", nargs="+", metavar="REC", help=text)
+    text = "folder (default: %(default)s)"
+    option("--out", type=Path, default=Path("build"), help=text)
+    text = "name of the model (default: that of the folder of the recordings)"
+    option("--name", help=text)
+    add_options(top)
     add_arm(top, "for recordings whose joint angles name no arm (default: Cody's)")
+    option(
+        "--front",
+        metavar="WHAT",
+        help="point of `make tradeoff`, at whose window the choice is made: fast, balanced, "
+        "accurate, milliseconds to decide within, or an accuracy (0 to 1) to reach",
+    )
+    fronts_json = Path("build/tradeoff/front.json")
+    text = "file with the points (default: %(default)s)"
+    option("--fronts", type=Path, metavar="front.json", default=fronts_json, help=text)
+    text = "OUT/report.html too, as `make export` writes it"
+    option("--report", action="store_true", help=text)
+    text = "tables of candidates, features with their units, and every note"
+    option("--verbose", action="store_true", help=text)
+    text = "recordings that are scored and never fitted, such as those of another day"
+    option("--test", nargs="+", metavar="REC", help=text)
+    text = "former model.onnx, which is scored on the --test recordings too"
+    option("--compare", metavar="old.onnx", help=text)
+    text = "folder for the model as C99 for a microcontroller"
+    option("--c", type=Path, metavar="DIR", help=text)
+    text = "Dask scheduler, whose workers follow and fit"
+    option("--cluster", metavar="tcp://HOST:PORT", help=text)
+    text = "with --c: skin to write as C99 too; without --data it is written alone"
+    option("--skin", metavar="skin.toml", help=text)
+    option(
+        "--c-error",
+        type=within(float, 1e-6, 1.0 - 1e-6),
+        metavar="RATE",
+        help="with --c: share of early decisions that may be wrong (default: decisions at the "
+        "full window alone)",
+    )
+    text = "with --c: kB that it may take; early decisions are left out first"
+    option("--flash", type=count, metavar="KB", help=text)
     top.set_defaults(run=run)
     return top
 
@@ -240,6 +106,10 @@ def parser() -> argparse.ArgumentParser:
 def run(arguments: argparse.Namespace) -> int:
     """Fit, write and report."""
     _check_options(arguments)
+    if not arguments.data:
+        check_writable(arguments.c)
+        _write_skin(arguments)
+        return 0
     # What may fail does so before the work, which may take an hour.
     for folder in filter(None, (arguments.out, arguments.c)):
         check_writable(folder)
@@ -256,18 +126,27 @@ def run(arguments: argparse.Namespace) -> int:
 
         path = arguments.out / "model.onnx"
         size = save(path, fitted, arguments.name, partial(_write_c, arguments))
-        prices = measure(fitted)
-        labels = [trial.labels for trial in fitted.dataset.trials]
-        print("\n".join(counts_text(labels)), end="\n\n", file=sys.stderr)
-        print(summary(fitted, prices), file=sys.stderr)
+        prices = measure(fitted) if arguments.verbose or arguments.report else []
+        _tell(fitted, prices, verbose=arguments.verbose)
         print(f"{path} ({size / 1024:.0f} kB)\n{path.with_name('golden.npz')}")
         if arguments.report:
             from train.report.model_report import write  # loads matplotlib
 
-            print(write(arguments.out, fitted, Model(path), prices, arguments.jobs))
+            jobs = FitOptions(jobs=arguments.jobs).processes
+            print(write(arguments.out, fitted, Model(path), prices, jobs))
         if held_out:
             print(held_out_text(Model(path), former, held_out), file=sys.stderr)
     return 0
+
+
+def _tell(fitted: Fitted, prices: Prices, *, verbose: bool) -> None:
+    """Print what was fitted: the trials, accuracies, settings, doubts and notes."""
+    lines = counts_text([trial.labels for trial in fitted.dataset.trials])
+    if verbose:
+        lines += [*details(fitted, prices), *summary(fitted)]
+    else:
+        lines += summary(fitted, MOST_LINES - FILES - len(lines))
+    print("\n".join(lines), file=sys.stderr)
 
 
 def _write_c(arguments: argparse.Namespace, model: Model) -> None:
@@ -275,7 +154,26 @@ def _write_c(arguments: argparse.Namespace, model: Model) -> None:
     if arguments.c:
         from export.c_code import export
 
+        _write_skin(arguments, model)
         print(export(model, arguments.c, arguments.c_error, arguments.flash))
+
+
+def _write_skin(arguments: argparse.Namespace, model: Model | None = None) -> None:
+    """Write the skin in C, where that is asked for."""
+    if arguments.skin:
+        from export import skin_code
+
+        file = skinfile.load(arguments.skin)
+        counts = skin_code.UNREADABLE
+        if model is not None:
+            layout = model.info.layout
+            counts = for_device(layout, file.layout).threshold_counts
+            if file.layout.counts_per_newton != layout.counts_per_newton:
+                raise InputError(
+                    f"{arguments.skin}: counts_per_newton differs from that of the "
+                    "recordings, and C converts no counts; give the skin theirs"
+                )
+        print(skin_code.export(file, arguments.c, counts))
 
 
 def _check_options(arguments: argparse.Namespace) -> None:
@@ -285,8 +183,13 @@ def _check_options(arguments: argparse.Namespace) -> None:
             "--compare needs --test: only recordings that neither model was fitted on "
             "tell which is better"
         )
-    if (arguments.c_error or arguments.flash) and not arguments.c:
-        raise InputError("--c-error and --flash need --c DIR")
+    of_c = arguments.c_error or arguments.flash or arguments.skin
+    if of_c and not arguments.c:
+        raise InputError("--c-error, --flash and --skin need --c DIR")
+    if not (arguments.data or arguments.skin):
+        raise InputError(
+            "give --data REC, or --c DIR --skin skin.toml for the skin alone"
+        )
 
 
 def _check_apart(data: list[str], held_out: Sequence[Path]) -> None:
@@ -307,37 +210,37 @@ def _check_apart(data: list[str], held_out: Sequence[Path]) -> None:
 
 def _fit(arguments: argparse.Namespace) -> Fitted:
     """Fit as the options say, which may be at a point of `make tradeoff`."""
-    window_s = arguments.window
-    quick = arguments.quick
+    options = {of_fit.name: getattr(arguments, of_fit.name) for of_fit in OF_COMMAND}
     if arguments.front is not None:
-        fixed = [f"--{name}" for name in FIXED if getattr(arguments, name) is not None]
-        if fixed:
-            raise InputError(
-                f"--front makes the model that was measured; drop {', '.join(fixed)}"
-            )
-        digest = read(arguments.data, skip_damaged=arguments.skip_damaged).digest
-        front = fronts.ParetoFront.read(arguments.fronts, digest)
-        point = front.pick(arguments.front)
-        print(
-            f"{arguments.front}: a window of {point.window_s:g} s, {front.task} "
-            f"{point.accuracy:.1%} ({100 * point.low:.0f} to {100 * point.high:.0f})",
-            file=sys.stderr,
-        )
-        window_s = point.window_s
-        quick = front.quick
-    points = arguments.decision_points
-    early = None
+        options |= _of_front(arguments)
+    points = options["decision_points_s"]
     if points is not None:
-        early = parse_decision_points(points, window_s or WINDOW_S)
-    return fit(
-        arguments.data,
-        **{name: getattr(arguments, name) for name in FORWARDED},
-        window_s=window_s,
-        decision_points_s=early,
-        arm=open_arm(arguments),
-        quick=quick,
-        progress=True,
+        window_s = options["window_s"] or WINDOW_S
+        options["decision_points_s"] = parse_decision_points(points, window_s)
+    return fit(arguments.data, **options, arm=open_arm(arguments), progress=True)
+
+
+def _of_front(arguments: argparse.Namespace) -> dict[str, Any]:
+    """The options of a fit at a point of `make tradeoff`.
+
+    Raises:
+        InputError: other options would make another model.
+    """
+    fixed = [name for name in FIXED if getattr(arguments, name) is not None]
+    if fixed:
+        flags = (f"--{name.removesuffix('_s')}" for name in fixed)
+        raise InputError(
+            f"--front makes the model that was measured; drop {', '.join(flags)}"
+        )
+    digest = read(arguments.data, skip_damaged=arguments.skip_damaged).digest
+    front = fronts.ParetoFront.read(arguments.fronts, digest)
+    point = front.pick(arguments.front)
+    print(
+        f"{arguments.front}: a window of {point.window_s:g} s, {front.task} "
+        f"{point.accuracy:.1%} ({100 * point.low:.0f} to {100 * point.high:.0f})",
+        file=sys.stderr,
     )
+    return {"window_s": point.window_s, "quick": front.quick}
 
 
 def held_out_text(

@@ -23,10 +23,10 @@ struct Stream {
   void setClock(unsigned long);
   void beginTransmission(uint8_t address);
   uint8_t endTransmission(bool stop = true);
-  size_t requestFrom(uint8_t address, uint8_t size);
+  size_t requestFrom(uint8_t address, size_t size);
   size_t print(const char*);
   size_t println(const char*);
-  size_t println(double, int digits);
+  size_t print(double, int digits);
   int available();
   int read();
   size_t write(uint8_t);
@@ -35,3 +35,11 @@ struct Stream {
   void onRequest(void (*)());
 };
 extern Stream Serial, Wire;
+
+struct Memory {
+  void begin(size_t);
+  uint8_t read(int);
+  void write(int, uint8_t);
+  bool commit();
+};
+extern Memory EEPROM;

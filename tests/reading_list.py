@@ -20,6 +20,7 @@ ROOMS = (
     "chips",
     "skin",
     "touch",
+    "features",
     "record",
     "decide",
     "sinks",

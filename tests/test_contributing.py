@@ -1,7 +1,7 @@
 """CONTRIBUTING.md: its table is true, and a toy of each kind is added as it says.
 
 `tests/edge/wire/chips/test_kinds.py` adds a chip, `tests/train/simulate/test_effects.py` an
-effect.
+effect, `tests/export/test_c_code.py` a quantity.
 """
 
 import json
@@ -43,7 +43,7 @@ def test_each_file_and_name_of_the_table_exists(row):
 
 
 def test_the_table_has_each_kind():
-    kinds = "chip|feature set|lab's data|form|message|effect|subcommand|section".split(
+    kinds = "chip|quantity|feature set|lab's data|form|message|effect|subcommand|section".split(
         "|"
     )
     for kind, row in zip(kinds, TABLE, strict=True):

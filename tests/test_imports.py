@@ -73,13 +73,11 @@ def test_nothing_pickles(package):
 
 
 PACKAGES = ["edge", "train", "export"]
-ROOMS = "wire touch record decide app"
-FRAME = [f"edge.{room}" for room in ROOMS.split()]
+ROOMS = ("wire", "touch", "features", "record", "decide", "app")
+FRAME = [f"edge.{room}" for room in ROOMS]
 """The way of one frame through `edge/`."""
-TOUCH = [
-    f"edge.touch.{s}" for s in "frame layout active measures track features".split()
-]
-"""The way of a touch: a frame becomes a region, a contact, a vector."""
+TOUCH = [f"edge.touch.{name}" for name in ("frame", "layout", "region", "track")]
+"""The way of a touch: a frame becomes a region, a contact."""
 FITTING = [f"train.{room}" for room in "data model choose fitting report".split()]
 """The rooms of the workstation, from the bottom."""
 OF_A_FRAME = {"edge.touch.frame", "edge.touch.layout"}

@@ -4,7 +4,7 @@ import re
 
 import pytest
 
-from edge.touch.features import WINDOW_S
+from edge.features.vector import WINDOW_S
 from tests.checks.bench import tables
 from tests.checks.hard_cases.registry import CASES
 from tests.conftest import ROOT
@@ -56,7 +56,7 @@ def test_each_table_names_its_command_commit_machine_and_date(name):
 
 @pytest.mark.parametrize("name", TABLES)
 def test_each_table_was_measured_at_a_commit_without_local_changes(name):
-    """Otherwise nobody can say what was measured: commit, then `make measured`."""
+    """Otherwise nobody can say what was measured: commit, then `make check`."""
     assert "-dirty" not in TABLES[name].splitlines()[0]
 
 

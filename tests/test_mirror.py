@@ -6,11 +6,12 @@ from pathlib import Path
 
 ROOT = Path(__file__).parents[1]
 THROUGH = {
-    "edge/touch/several.py": "edge/test_several_contacts.py",
     "train/study": "train/study/test_study_report.py",
     "train/tradeoff": "train/tradeoff/test_tradeoff.py",
+    "train/commands/tradeoff.py": "train/tradeoff/test_tradeoff.py",
     "train/report/options.py": "train/study/test_study_report.py",
     "train/report/work.py": "train/study/test_study_report.py",
+    "train/fitted.py": "train/test_fitting.py",
     "train/data/contacts.py": "train/data/test_dataset.py",
     "train/importers/rosbag.py": "train/importers/test_log_importers.py",
     "train/importers/topics.py": "train/importers/test_log_importers.py",

@@ -1,9 +1,12 @@
 """Measuring programs refuse options that would measure nothing, before they begin; and
 a table names the command that made it."""
 
+from types import SimpleNamespace
+
 import pytest
 
 from edge.errors import EdgeError
+from tests.checks import __main__ as checks
 from tests.checks import mutants
 from tests.checks.bench import tables
 from tests.checks.bench.program import start
@@ -73,3 +76,18 @@ def test_other_skins_have_their_traits():
     assert touch(glove, 3, 1).frames[0].max() > 60
     loads = touch(force_glove, 3, 0).frames[60:].sum(axis=(1, 2))
     assert loads.max() > 10 * loads.min()
+
+
+def test_options_of_a_check_reach_its_last_step_and_a_failed_step_ends_it(monkeypatch):
+    steps = []
+
+    def run(step, **options):
+        steps.append(step[2:])
+        return SimpleNamespace(returncode=len(steps) // 3)
+
+    monkeypatch.setattr(checks.subprocess, "run", run)
+    assert checks.main(["--out", "o", "shifts", "--model", "m", "--help"]) == 1
+    assert [step[0] for step in steps[:2]] == ["train", "export"]
+    assert steps[2][-3:] == ("--model", "m", "--help")
+    assert checks.main(["--data", "a", "b", "--", "stopping"]) == 1
+    assert steps[3:] == [("tests.checks.bench.stopping", "--data", "a", "b")]

@@ -21,7 +21,6 @@ OPTIONAL = (
     "edge/app/sinks/systemd.py",
     "edge/record/recording.py",
     "edge/touch/joint_stream.py",
-    "edge/touch/kernels.py",
     "edge/touch/urdf.py",
     "edge/writing.py",
 )

@@ -6,7 +6,8 @@
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from train.fitting import Fitted, fit
+    from train.fitted import Fitted
+    from train.fitting import fit
 
 __all__ = ["Fitted", "fit"]
 

@@ -1,29 +1,28 @@
 """Recordings to a fitted model: load, choose, calibrate, fit."""
 
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, field, replace
-from functools import cached_property
+from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from edge.arrays import Floats
 from edge.errors import InputError
+from edge.features.vector import WINDOW_S
 from edge.record.slips import slips, too_few
-from edge.touch.features import WINDOW_S
-from train.choose.candidates import Candidate
 from train.choose.decision_points import decision_points, has_early_points
-from train.choose.options import FitOptions, Loaded, trials_of
-from train.choose.settings import Chosen, Settings
-from train.choose.windows import windows_of
+from train.choose.options import FitOptions, described
+from train.choose.settings import Settings
 from train.data.broken import BrokenTaxels
 from train.data.dataset import DataSet, read
 from train.data.folds import representative
 from train.data.groups import TRIAL, are_drawn
 from train.data.leaks import leaks, without_copies
 from train.data.tasks import labels_of_tasks, lacking
-from train.data.vectors import Labels, Vectors
-from train.model.pipeline import Choice, ContactClassifier
-from train.model.stopping import Early, SequentialClassifier
+from train.data.vectors import Labels
+from train.fitted import Fitted
+from train.model.pipeline import ContactClassifier
+from train.model.stopping import SequentialClassifier
+from train.notes import warnings
+from train.tune import Loaded, choosing_of, trials_of, window, windows_of
 
 FEWEST_TRIALS = 3
 MOST_CHOSEN = 1000
@@ -31,97 +30,19 @@ MOST_CHOSEN = 1000
 not grow with more of them."""
 
 
-@dataclass(frozen=True)
-class Fitted:
-    """A fitted model, with everything that its file says about it.
-
-    Attributes:
-        dataset: the trials it was fitted on, with the features that it takes.
-        measured: the trials that the settings were chosen by, with the features of
-            every candidate.
-        window_s: of the full decision.
-        samples: values of a feature.
-        X: (n, p) feature vectors at the full window.
-        chosen: {task: its settings}.
-        candidates: the candidates that they were chosen among.
-        classifier: at the full window.
-        sequential: at all decision points, where it was calibrated.
-        notes: sentences that a user should read.
-    """
-
-    dataset: DataSet
-    measured: DataSet
-    window_s: float
-    samples: int
-    X: Floats = field(repr=False)
-    chosen: dict[str, Chosen]
-    candidates: tuple[Candidate, ...]
-    classifier: ContactClassifier
-    sequential: SequentialClassifier | None = None
-    notes: tuple[str, ...] = ()
-
-    @property
-    def early(self) -> Early | None:
-        """Settings of the decision points before the full window, where these have
-        their own."""
-        return None if self.sequential is None else self.sequential.early
-
-    @cached_property
-    def _vectors(self) -> Vectors:
-        """The trials with the features of every candidate."""
-        return self.measured.vectors(self.window_s, self.samples, {})
-
-    def selection(self, choices: Iterable[Choice]) -> tuple[DataSet, Vectors]:
-        """The trials, and their vectors, with the features and labels that some
-        settings of the tasks take."""
-        tasks = set(self.chosen)
-        features: list[str] = []
-        for choice in choices:
-            tasks.update(choice.targets)
-            features += choice.features
-        y = {task: self.measured.labels(task) for task in tasks}
-        return self.measured.of(features), replace(self._vectors.of(features), y=y)
-
-
 def fit(data: DataSet | str | Path | Sequence[str | Path], **options: Any) -> Fitted:
     """Choose and fit every task of some recordings.
 
     Options you pass are held fixed. The others are chosen among the candidates of
     `train.choose.candidates`, as `train.choose.protocols` says: for tasks whose groups
-    are left out together, by the accuracy with trials and with groups left out; for
+    are held out together, by the accuracy with trials and with groups held out; for
     others each the smallest model within one standard error of the best in
     cross-validation (the best where there are fewer than 200 trials).
 
     Args:
         data: recordings, folders of them, or a data set that was loaded for the
             features.
-        features: names of sets and of single features.
-        projection: `pca` or `lda`.
-        scaling: one of `train.model.scaling.SCALINGS`.
-        components: principal components.
-        k: neighbours.
-        window_s: seconds from onset. Where None it is `WINDOW_S`, or twice that and so
-            on where touches last so long and accuracy rises enough
-            (`Choosing.window`).
-        second_worth: accuracy that is worth a second of waiting.
-        samples: values of a feature.
-        tasks: keys of the labels; all that the recordings share where None.
-        leave_out: label whose groups are left out to choose the settings of a task and
-            to measure its accuracy, where each of its classes has several groups;
-            `trial` for single trials.
-        decision_points_s: windows at which decisions are calibrated, rising, the last
-            of them `window_s`; empty for none. Where None there is one every 0.1 s, or
-            less often, if the number of trials and the size of the model allow it.
-        threshold: counts above which a taxel is in contact.
-        onset: counts above which a contact begins.
-        release: seconds that a contact may be away and go on. Where None they are the
-            skin's, or more where that is more accurate (`train.data.pieces.joined`).
-        arm: for recordings with joint angles that name no arm.
-        dead: (row, col) of taxels that are left out.
-        quick: fewer candidates and folds.
-        skip_damaged: go on without the files that cannot be read.
-        jobs: processes; all cores where None.
-        progress: show progress bars on stderr.
+        options: fields of `train.choose.options.FitOptions`, listed below.
 
     Raises:
         InputError: the recordings cannot be used, or an option is not possible with
@@ -138,7 +59,6 @@ def fit(data: DataSet | str | Path | Sequence[str | Path], **options: Any) -> Fi
     y = labels_of_tasks(loaded.dataset, fixed.tasks)
     labels = [trial.labels for trial in loaded.dataset.trials]
     places = [str(trial.path) for trial in loaded.dataset.trials]
-    doubts = [f"warning: probably a slip: {text}" for text in slips(labels, places)]
     if len(labels) < FEWEST_TRIALS:
         raise InputError(
             f"a fit needs at least {FEWEST_TRIALS} trials, not {len(labels)}; record more"
@@ -147,13 +67,10 @@ def fit(data: DataSet | str | Path | Sequence[str | Path], **options: Any) -> Fi
     few = {task: of_task[taught] for task, of_task in y.items()}
     untouched = loaded.dataset.untouched[:: len(labels) // len(taught)]
     sample = replace(loaded.dataset.part(taught), untouched=untouched)
-    settings = choose(replace(loaded, dataset=sample), few, fixed)
+    settings, of_window = choose(replace(loaded, dataset=sample), few, fixed)
     settings = settings.with_others(taught, y)
     measured = loaded.dataset.with_kernels(settings.window_s)
-    notes = [*doubts, *lacking(loaded.dataset, fixed.tasks), *loaded.notes]
-    notes += [*_of_unseen(settings, fixed), *leaks(sample, few)]
-    points = decision_points(measured, settings, fixed, notes)
-    notes += [*settings.notes, *too_few(labels)]
+    points, of_points = decision_points(measured, settings, fixed)
     if len(points) < 2:
         settings = replace(settings, early=None)
     dataset = measured.of(sorted(settings.features()))
@@ -164,7 +81,7 @@ def fit(data: DataSet | str | Path | Sequence[str | Path], **options: Any) -> Fi
         classifier = sequential.decision_points_[-1]
     else:
         classifier = ContactClassifier.of(settings.choices, vectors)
-    return Fitted(
+    fitted = Fitted(
         dataset=dataset,
         measured=replace(sample, kernels=measured.kernels),
         window_s=settings.window_s,
@@ -174,8 +91,22 @@ def fit(data: DataSet | str | Path | Sequence[str | Path], **options: Any) -> Fi
         candidates=tuple(settings.candidates),
         classifier=classifier,
         sequential=sequential,
-        notes=tuple(notes),
     )
+    notes = (
+        *(f"warning: probably a slip: {text}" for text in slips(labels, places)),
+        *lacking(loaded.dataset, fixed.tasks),
+        *loaded.notes,
+        *_of_unseen(settings, fixed),
+        *leaks(sample, few),
+        *of_points,
+        *of_window,
+        *too_few(labels),
+        *warnings(fitted),
+    )
+    return replace(fitted, notes=notes)
+
+
+fit.__doc__ = f"{fit.__doc__}\nOptions:\n{described()}\n"
 
 
 def load(
@@ -200,20 +131,23 @@ def load(
     return replace(loaded, notes=[*notes, *loaded.notes])
 
 
-def choose(loaded: Loaded, y: Labels, options: FitOptions) -> Settings:
-    """The settings of each task, and the window."""
+def choose(
+    loaded: Loaded, y: Labels, options: FitOptions
+) -> tuple[Settings, list[str]]:
+    """The settings of each task, and sentences on the window."""
     dataset = loaded.dataset
-    choosing = options.choosing(dataset, y, drawn=are_drawn(dataset))
+    choosing = choosing_of(dataset, y, options)
     windows = loaded.windows
     if len(windows) > 1:
         windows = windows_of(
             [float(t.recording.t[-1]) - t.onset_s for t in dataset.trials]
         )
-    window_s, notes = choosing.window(windows, options.second_worth)
-    settings = replace(choosing.choose(window_s), notes=notes)
-    if options.quick or not has_early_points(settings, options):
-        return settings
-    return replace(settings, early=choosing.early(window_s, settings.chosen))
+    window_s, notes = window(choosing, windows, options.second_worth)
+    settings = choosing.choose(window_s)
+    if not options.quick and has_early_points(settings, options):
+        early = choosing.early(window_s, settings.chosen)
+        settings = replace(settings, early=early)
+    return settings, notes
 
 
 def calibrate(
@@ -237,15 +171,15 @@ def calibrate(
         drawn=are_drawn(dataset),
         heading="calibrating" * options.progress,
     )
-    grouped = [t for t, chosen in settings.chosen.items() if chosen.left_out != TRIAL]
+    grouped = [t for t, chosen in settings.chosen.items() if chosen.held_out != TRIAL]
     return classifier.fit(at_points, y, settings.folds, settings.without, grouped)
 
 
 def _of_unseen(settings: Settings, options: FitOptions) -> list[str]:
     """How to choose settings for recorded objects instead, where they are chosen for
     others."""
-    left_out = {chosen.left_out for chosen in settings.chosen.values()}
-    if options.quick or left_out == {TRIAL}:
+    held_out = {chosen.held_out for chosen in settings.chosen.values()}
+    if options.quick or held_out == {TRIAL}:
         return []
     return [
         "the settings are chosen for unseen objects; `--leave-out trial` chooses "

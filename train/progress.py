@@ -24,12 +24,12 @@ def bar(iterable: Iterable[Any] | None = None, **options: Any) -> Any:
     if sys.stderr.isatty() or options.get("disable"):
         return tqdm(iterable, **options)
     often = {"delay": FIRST_S, "mininterval": LOG_S, "maxinterval": LOG_S}
-    progress = tqdm(iterable, file=Lines(), **often, **options)
+    progress = tqdm(iterable, file=LogLines(), **often, **options)
     progress.last_print_t -= LOG_S - FIRST_S
     return progress
 
 
-class Lines:
+class LogLines:
     """Stderr where each state of a bar is a line of its own."""
 
     def write(self, text: str) -> None:

@@ -3,8 +3,7 @@
 import argparse
 
 from edge.errors import InputError
-from edge.touch.arm import Chain
-from edge.touch.arm_file import read_arm
+from edge.touch.arm import Chain, read_arm
 
 
 def task_label(text: str) -> tuple[str, str]:

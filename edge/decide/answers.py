@@ -2,12 +2,12 @@
 
 from dataclasses import replace
 
+from edge.decide.doubts import frame_doubts
 from edge.decide.events import Decided
 from edge.decide.info import ModelInfo
 from edge.decide.model import Decision, Model
 from edge.errors import OutOfRange
 from edge.touch.contact import Contact, FeatureSeries
-from edge.touch.doubts import frame_doubts
 
 
 def answers_about(
@@ -73,7 +73,7 @@ def contact_doubts(
     """{flag: whether it holds} for a measured contact, see `edge.decide.flags`."""
     doubts = frame_doubts(series, window_s)
     if info.joints:
-        from edge.touch.joint_doubts import joint_doubts  # not every model has joints
+        from edge.decide.doubts import joint_doubts  # not every model has joints
 
         limits = () if info.chain is None else info.chain.limits
         doubts |= joint_doubts(series, window_s, limits, info.still_s, info.speeds)

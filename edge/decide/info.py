@@ -12,14 +12,15 @@ from typing import TYPE_CHECKING
 from edge.arrays import Floats
 from edge.elementary import log, logistic
 from edge.errors import InputError
-from edge.touch.features import feature_vector, widths
+from edge.features.names import measures
+from edge.features.vector import feature_vector, widths
 from edge.touch.layout import SkinLayout, for_device
 from edge.touch.track import ContactTracker
 
 if TYPE_CHECKING:
+    from edge.features.kernels import KernelTable
     from edge.touch.arm import Chain
     from edge.touch.contact import FeatureSeries
-    from edge.touch.kernels import KernelTable
 
 METADATA_KEY = "edge-classify"
 FORMAT = 9
@@ -305,13 +306,13 @@ class ModelInfo:
             InputError: the skin is not the one that the model was made for, or several
                 contacts are to have onsets from outside.
         """
+        device = for_device(self.layout, layout)
         tracker = ContactTracker(
-            for_device(self.layout, layout),
+            device,
             self.debounce,
             chain=self.chain,
             horizon_s=self.window_s,
-            features=self.features,
-            joints=self.joints,
+            measures=measures(device, self.features, self.joints),
             max_contacts=max_contacts,
         )
         tracker.outside = bool(self.onset)

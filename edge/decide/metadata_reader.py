@@ -15,8 +15,9 @@ from edge.decide.info import (
     Task,
 )
 from edge.errors import InputError, about
-from edge.touch.contact import feature_types
-from edge.touch.feature import KERNELS
+from edge.features.kernels import read_tables
+from edge.features.names import feature_types
+from edge.features.quantities import KERNELS
 from edge.touch.frame import ONSETS
 from edge.touch.layout import SkinLayout
 
@@ -74,8 +75,6 @@ def _read(meta: ConfigTable) -> ModelInfo:
         novelty = Novelty(typical, table.numbers("limits", count, low=0.0))
     kernels = {}
     if not KERNELS.keys().isdisjoint(names):
-        from edge.touch.kernels import read_tables  # few models have any
-
         kernels = read_tables(meta.table("kernels"), names, layout)
     info = ModelInfo(
         tasks=task_of,
@@ -207,7 +206,9 @@ def _contradictions(info: ModelInfo) -> Iterator[str]:
 
 
 def _contradictions_of_joints(info: ModelInfo) -> Iterator[str]:
-    of_joints = any(feature.of_joints for feature in feature_types(info.features))
+    of_joints = any(
+        feature.quantity.of_joints for feature in feature_types(info.features)
+    )
     if info.joints != ((info.dof or None) if of_joints else 0):
         features = "joint features" if of_joints else "no joint features"
         yield f"names {features} but gives {info.joints} joints"

@@ -34,13 +34,13 @@ import numpy as np
 from edge.arrays import Array, Floats, Integers
 from edge.decide.model import Model
 from edge.errors import InputError
+from edge.features.quantities import OF_CELLS
 from edge.files import parsing
 from edge.record.npz import load_arrays, load_meta
 from edge.record.recording import Recording
 from edge.touch.contact import FeatureSeries
-from edge.touch.feature import OF_CELLS
-from edge.touch.first_contact import first_contact
 from edge.touch.layout import SkinLayout
+from edge.touch.track import first_contact
 
 OUTPUTS = ("label", "neighbours", "scores", "distances")
 """Ends of the names of a task's outputs."""

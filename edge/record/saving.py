@@ -14,7 +14,7 @@ from edge.arrays import Array
 from edge.errors import InputError
 from edge.record.labels import Table, read_table
 from edge.record.recording import KEYS, Recording, checked, warn_of_another_unit
-from edge.touch.thresholds import doubt
+from edge.record.thresholds import doubt, shear_doubt
 from edge.writing import write_whole
 
 LOG = logging.getLogger(__name__)
@@ -67,9 +67,7 @@ def save(
     if why is not None and not recording.onsets_s:
         LOG.warning(f"{name}: {why}")
     if recording.shear is not None and "simulation" not in recording.meta:
-        from edge.touch import shear  # few skins have three axes
-
-        still = shear.doubt(recording.shear)
+        still = shear_doubt(recording.shear)
         if still is not None:
             LOG.warning(f"{name}: {still}")
     fields = {key: getattr(recording, key) for key in KEYS if key != "meta"}

@@ -1,1 +1,1 @@
-"""From a frame to the features of a contact: regions, and contacts over time."""
+"""From a frame to a contact that is followed: regions, the arm, contacts over time."""

@@ -96,10 +96,41 @@ class Chain:
         after it."""
 
     def pose(self, q: ArrayLike) -> Floats:
-        """Pose of the tip in the base's frame; see `edge.touch.joint_angles.pose`."""
-        from edge.touch.joint_angles import pose  # the board follows single points
+        """Pose of the tip in the base's frame.
 
-        return pose(self.names, self.carried, q)
+        Args:
+            q: (dof,) or (..., dof) radians, or metres for a sliding joint, from base to
+                tip.
+
+        Returns:
+            (4, 4) or (..., 4, 4) homogeneous transform, metres.
+
+        Raises:
+            InputError: there is another number of angles, or one is not finite, or
+                beyond `MOST_RAD`.
+        """
+        try:
+            angles = np.asarray(q, dtype=np.float64)
+        except (TypeError, ValueError):
+            raise InputError(f"joint angles must be numbers, not {q!r}") from None
+        if angles.shape[-1:] != (self.dof,):
+            raise InputError(
+                f"the arm takes {self.dof} joint angles ({', '.join(self.names)}), not "
+                f"an array {angles.shape}"
+            )
+        within = np.abs(angles) <= MOST_RAD
+        if not within.all():
+            joint = self.names[np.argwhere(~within)[0][-1]]
+            raise InputError(
+                f"the angle of joint {joint} is not within {MOST_RAD:g} rad"
+            )
+        transform = np.zeros((*angles.shape[:-1], 4, 4))
+        transform[..., 3, 3] = 1.0
+        of_each_joint = np.moveaxis(angles, -1, 0)[..., None]
+        transform[..., :3, :] = np.stack(
+            self.carried(of_each_joint, np.eye(4)), axis=-2
+        )
+        return transform
 
     def point(self, q: ArrayLike, position: Sequence[float]) -> Vector:
         """A point of the tip in the base's frame, as plain floats: `pose(q)` times it.
@@ -263,3 +294,26 @@ def _vector(table: ConfigTable, key: str) -> Vector:
     """Three numbers. No link is a kilometre long, so that no product overflows."""
     x, y, z = table.numbers(key, 3, low=-LONGEST_M, high=LONGEST_M)
     return x, y, z
+
+
+def read_arm(
+    path: str | os.PathLike[str],
+    base: str | None = None,
+    tip: str | None = None,
+) -> Chain:
+    """The chain of a TOML file, or of a URDF file between two of its links.
+
+    Raises:
+        InputError: as `Chain.from_toml` and `Chain.from_urdf`; or links are given for a
+            TOML file, or a link is missing for a URDF.
+    """
+    if Path(path).suffix.lower() in (".urdf", ".xml", ".xacro"):
+        if base is None or tip is None:
+            raise InputError(
+                f"{path}: a URDF needs --base and --tip, the arm's first link and the "
+                "link that carries the skin"
+            )
+        return Chain.from_urdf(path, base, tip)
+    if base is not None or tip is not None:
+        raise InputError(f"{path}: --base and --tip are for a .urdf file")
+    return Chain.from_toml(path)

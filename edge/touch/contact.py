@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from operator import sub
-from typing import TYPE_CHECKING, Any, Self
+from typing import TYPE_CHECKING, Any, Protocol, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,16 +14,13 @@ from numpy.typing import NDArray
 from edge.arrays import Booleans, Counts, Floats, Integers
 from edge.elementary import length
 from edge.errors import InputError
-from edge.touch.active import ActiveTaxels, Region
-from edge.touch.feature import OF_CELLS, OF_PAPER, PAPER, Feature
 from edge.touch.frame import Frame
 from edge.touch.layout import SkinLayout
+from edge.touch.region import ActiveTaxels, Region
 
 if TYPE_CHECKING:
     from edge.touch.arm import Chain, Vector
-    from edge.touch.cells import Cells
     from edge.touch.joint_angles import JointAngles
-    from edge.touch.zones import Zones
 
 CLOCK_ROUNDING_S = 1e-6
 """Shorter than a frame, and longer than the rounding of a clock that counts 1e9
@@ -51,15 +48,15 @@ class FeatureSeries:
         layout: the skin, with its thresholds.
         ended: the contact ended with the last frame.
         speed: of the joints before onset, see `Contact`.
-        zones: {zone: (n, 8)} whole numbers of each zone, see `edge.touch.zones`; 10
+        zones: {zone: (n, 8)} whole numbers of each zone, see `edge.features.zones`; 10
             with those of its shear.
         force_motion: (n,) as `motion`, of the force-weighted centroid, or None.
-        taxel_force: (n, cells) value of each cell of the skin (`edge.touch.cells.Cells`),
+        taxel_force: (n, cells) value of each cell of the skin (`edge.features.cells.Cells`),
             or None.
         taxel_kernels: (n, cells) likewise, of the larger cells that kernels take, or
             None.
         taxel_shear: (n, 2 * cells) likewise, of the shear of the same cells
-            (`edge.touch.cells.ShearCells`), or None.
+            (`edge.features.cells.ShearCells`), or None.
         joints: (n, dof) joint angles in radians, NaN where they were not known, or
             None.
     """
@@ -107,64 +104,46 @@ class FeatureSeries:
         return replace(self, **changes)
 
 
-def feature_types(names: Sequence[str]) -> tuple[Feature, ...]:
-    """The feature types of several names.
+class ZoneMeasure(Protocol):
+    """Measures zones of a frame."""
 
-    Raises:
-        InputError: no name is given, one of them does not exist, or one is given twice.
-    """
-    if not names:
-        raise InputError(f"no feature named; the paper's are {', '.join(PAPER)}")
-    twice = {name for name in names if names.count(name) > 1}
-    if twice:
-        raise InputError(f"the feature {min(twice)} is named twice; leave one out")
-    if OF_PAPER.keys() >= set(names):
-        return tuple(OF_PAPER[name] for name in names)
-    from edge.touch.measures import feature  # many models have the paper's alone
+    def measure(
+        self,
+        active: ActiveTaxels,
+        contact: Region | None,
+        shear: NDArray[np.int16] | None,
+    ) -> list[int]:
+        """The whole numbers of each zone."""
 
-    return tuple(map(feature, names))
+    def split(self, rows: Integers) -> dict[str, Integers]:
+        """{zone: (n, width)} of the numbers of frames."""
 
 
-class Measurer:
-    """The measures of a skin's frames that some features need.
+class CellMeasure(Protocol):
+    """Measures cells of the skin in a frame."""
+
+    def read(self, frame: Frame) -> Integers:
+        """(values,) of a frame."""
+
+
+@dataclass(frozen=True)
+class Measures:
+    """What is measured in the frames of a contact: by default what the paper's features
+    take. `edge.features.names.measures` makes one for other features.
 
     Attributes:
-        layout: the skin.
         motion: whether the contact's centroid is followed.
         force_motion: whether its force-weighted centroid is followed.
-        zones: that are measured, or None.
-        joints: what reads the joint angles, or None.
-        readers: {name in `FeatureSeries`: what reads the skin's cells, or the joint
-            angles, of a frame}.
+        zones: that are measured, the contact's first, or None.
+        joints: what reads the joint angles, or None. It watches one stream.
+        cells: {name in `FeatureSeries`: what reads the skin's cells}.
     """
 
-    def __init__(
-        self,
-        layout: SkinLayout,
-        names: Sequence[str],
-        joints: int = 0,
-    ) -> None:
-        types = feature_types(names)
-        quantities = {feature.quantity for feature in types}
-        self.layout = layout
-        self.motion = "motion" in quantities
-        self.force_motion = not quantities.isdisjoint(("force_motion", "stiffness"))
-        self.zones: Zones | None = None
-        if any(feature.zones for feature in types):
-            from edge.touch.zones import Zones
-
-            self.zones = Zones(layout, types)
-        self.joints: JointAngles | None = None
-        self.readers: dict[str, Cells | JointAngles] = {}
-        if not quantities.isdisjoint(OF_CELLS):
-            from edge.touch.cells import cells_for
-
-            self.readers.update(cells_for(layout, quantities))
-        if joints and any(feature.of_joints for feature in types):
-            from edge.touch.joint_angles import JointAngles
-
-            self.joints = JointAngles(joints)
-            self.readers["joints"] = self.joints
+    motion: bool = True
+    force_motion: bool = False
+    zones: ZoneMeasure | None = None
+    joints: JointAngles | None = None
+    cells: Mapping[str, CellMeasure] = field(default_factory=dict)
 
 
 class Contact:
@@ -191,7 +170,8 @@ class Contact:
         self,
         onset_s: float,
         region: Region | None,
-        measurer: Measurer,
+        layout: SkinLayout,
+        measures: Measures,
         chain: Chain | None,
     ) -> None:
         self.onset_s = onset_s
@@ -199,15 +179,15 @@ class Contact:
         self.touched_s = 0.0
         self.frames = 0
         self.region = region
-        self.layout = measurer.layout
+        self.layout = layout
         self.chain = chain
         self.ended = False
-        self.speed = math.nan if measurer.joints is None else measurer.joints.speed
+        self.speed = math.nan if measures.joints is None else measures.joints.speed
         self.late = False
         self.missing_taxels = False
         self.missing_pose = False
         self.joints: Floats | None = None
-        self._measurer = measurer
+        self._measures = measures
         self._rows: list[dict[str, Any]] = []
         """One dict per frame, keyed like `FeatureSeries`; `counted` (m,) holds the whole
         numbers of region and zones."""
@@ -230,7 +210,7 @@ class Contact:
             region: the contact's; None where nothing of it is above the threshold.
             age_s: when the region was read, seconds from onset, at least 0.
         """
-        measurer = self._measurer
+        measures = self._measures
         if self._rows and age_s <= self.age_s:
             age_s = self.age_s
             self._forget_last()
@@ -240,20 +220,21 @@ class Contact:
         if region is not None:
             self.region = region
             self.joints = frame.joints
-            sums = region.sums if measurer.motion else (0, 0)
+            sums = region.sums if measures.motion else (0, 0)
             counted = [region.peak, region.area, *sums]
-        if measurer.zones is not None:
-            counted += measurer.zones.measure(active, region, frame.shear)
+        if measures.zones is not None:
+            counted += measures.zones.measure(active, region, frame.shear)
         row: dict[str, Any] = {
             "t": age_s,
             "same": self._repeats(frame),
             "counted": np.array(counted, dtype=np.int64),
             **self._motions(frame, region, counted),
         }
-        for name, reader in measurer.readers.items():
-            row[name] = reader.read(frame)
-        if "joints" in row and frame.joints is None:
-            self.missing_pose = True
+        for name, cells in measures.cells.items():
+            row[name] = cells.read(frame)
+        if measures.joints is not None:
+            row["joints"] = measures.joints.read(frame)
+            self.missing_pose |= frame.joints is None
         self._rows.append(row)
         self.age_s = age_s
 
@@ -277,17 +258,17 @@ class Contact:
         counted: list[int],
     ) -> dict[str, float]:
         """The distances that the centroids have travelled, without contact the last."""
-        measurer = self._measurer
+        measures = self._measures
         motions = {"motion": 0.0}
-        if measurer.force_motion:
+        if measures.force_motion:
             motions["force_motion"] = 0.0
         if region is None:
             if self._rows:
                 return {name: self._rows[-1][name] for name in motions}
             return motions
-        if measurer.motion:
+        if measures.motion:
             motions["motion"] = self._distance("motion", region.centroid, frame.joints)
-        if measurer.force_motion:
+        if measures.force_motion:
             # The contact's zone comes first.
             _, _, force, rows, cols, *_ = counted[PLAIN:]
             centroid = rows / force, cols / force % self.layout.cols
@@ -337,7 +318,7 @@ class Contact:
             name: np.array([row[name] for row in self._rows]) for name in self._rows[0]
         }
         counted = columns.pop("counted")
-        zones = self._measurer.zones
+        zones = self._measures.zones
         return FeatureSeries(
             **columns,
             peak=counted[:, 0],

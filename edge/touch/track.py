@@ -3,22 +3,23 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
+from operator import itemgetter
 from typing import TYPE_CHECKING
 
 from edge.errors import InputError
-from edge.touch.active import ActiveTaxels, Region
 from edge.touch.contact import (
     CLOCK_ROUNDING_S,
     Contact,
-    Measurer,
+    FeatureSeries,
+    Measures,
     region_time,
     released,
 )
-from edge.touch.feature import PAPER
 from edge.touch.frame import Frame
 from edge.touch.layout import SkinLayout
+from edge.touch.region import ActiveTaxels, Region
 
 if TYPE_CHECKING:
     from edge.touch.arm import Chain
@@ -70,8 +71,7 @@ class ContactTracker:
         *,
         chain: Chain | None = None,
         horizon_s: float = math.inf,
-        features: Sequence[str] = PAPER,
-        joints: int = 0,
+        measures: Measures | None = None,
         max_contacts: int = 1,
     ) -> None:
         """Follow contacts on a skin.
@@ -84,13 +84,12 @@ class ContactTracker:
                 joint angles; without, on the skin.
             horizon_s: seconds from onset after which a contact's series takes in no
                 more.
-            features: names of the features that the series is for (see
-                `edge.touch.measures`); nothing else is measured.
-            joints: joint angles of a frame, where a feature is made of them.
+            measures: what is measured, as `edge.features.names.measures` makes it; None
+                measures what the paper's features take.
             max_contacts: how many are followed at once, the largest first.
 
         Raises:
-            InputError: a feature does not exist, or `max_contacts` is below 1.
+            InputError: `max_contacts` is below 1.
         """
         if max_contacts < 1:
             raise InputError(f"max_contacts must be at least 1, not {max_contacts!r}")
@@ -101,7 +100,7 @@ class ContactTracker:
         self.region: Region | None = None
         self._debounce = debounce
         self._chain = chain
-        self._measurer = Measurer(layout, features, joints)
+        self._measures = measures or Measures()
         self.max_contacts = max_contacts
         self.contacts: list[Contact] = []
         self._t = -math.inf
@@ -195,8 +194,6 @@ class ContactTracker:
         """The regions to follow, the largest first, and {contact: the region that
         continues it}."""
         if self.max_contacts > 1:
-            from edge.touch.several import shared  # few follow more than one
-
             return active.regions, shared(self.contacts, active.regions)
         former = self.contacts[0].region if self.contacts else None
         largest = active.largest(former)
@@ -208,7 +205,8 @@ class ContactTracker:
     def _begin(self, frame: Frame, region: Region | None) -> Contact:
         on_skin = self.motion_on_skin and frame.joints is None
         chain = None if on_skin else self._chain
-        return Contact(region_time(frame, region), region, self._measurer, chain)
+        onset_s = region_time(frame, region)
+        return Contact(onset_s, region, self.layout, self._measures, chain)
 
     def _follow(
         self,
@@ -253,5 +251,53 @@ class ContactTracker:
         if frame.t < self._t:
             raise InputError(f"time goes back from {self._t} to {frame.t} s")
         self._t = frame.t
-        if self._measurer.joints is not None:
-            self._measurer.joints.watch(frame)
+        if self._measures.joints is not None:
+            self._measures.joints.watch(frame)
+
+
+def shared(
+    contacts: Sequence[Contact], regions: Sequence[Region]
+) -> dict[Contact, Region]:
+    """{contact: the region that continues it}.
+
+    Most taxels in common come first, then the older contact, then the larger region.
+
+    Args:
+        contacts: the oldest first.
+        regions: the largest first.
+    """
+    pairs = []
+    for contact in contacts:
+        for region in regions:
+            former = contact.region
+            if former is not None and former.touches(region):
+                common = (former.bits & region.bits).bit_count()
+                pairs.append((common, contact, region))
+    shares: dict[Contact, Region] = {}
+    for _, contact, region in sorted(pairs, key=itemgetter(0), reverse=True):
+        if contact not in shares and region not in shares.values():
+            shares[contact] = region
+    return shares
+
+
+def first_contact(
+    frames: Iterable[Frame], tracker: ContactTracker
+) -> tuple[float, FeatureSeries] | None:
+    """Onset in seconds and series of the first contact, or None without contact.
+
+    Frames after its end, or beyond the tracker's horizon, are not read.
+
+    Args:
+        frames: in the order of time; a `Recording` is such a stream.
+        tracker: fresh.
+    """
+    first: Contact | None = None
+    for frame in frames:
+        contacts = tracker.push(frame)
+        if first is None and contacts:
+            first = contacts[0]
+        if first is not None and (
+            first.ended or frame.t - first.onset_s >= tracker.horizon_s
+        ):
+            break
+    return None if first is None else (first.onset_s, first.series())

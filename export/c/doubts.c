@@ -1,4 +1,4 @@
-/* Reasons to doubt the frames of a contact's window: edge/touch/doubts.py. */
+/* Reasons to doubt the frames of a contact's window: edge/decide/doubts.py. */
 #include "internal.h"
 
 #define GAP_SHARE (1.0 / 24.0)

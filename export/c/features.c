@@ -1,4 +1,4 @@
-/* The values of a contact at sample times to the vector that is classified: edge/touch/features.py,
+/* The values of a contact at sample times to the vector that is classified: edge/features/vector.py,
    transforms.py, kernels.py. It is made in slices. */
 #include "internal.h"
 

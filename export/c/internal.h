@@ -171,15 +171,7 @@ extern const uint8_t ec_zone_names[]; /* EC_NO_ZONE comes last */
 extern const int16_t ec_cell_of_taxel[];
 extern const int16_t ec_kernel_cell_of_taxel[];
 
-/* model.c: the features, by the names of edge/touch/measures.py */
-enum {
-  EC_Q_MAX_FORCE, EC_Q_FORCE, EC_Q_AREA, EC_Q_PRESSURE, EC_Q_ALONG, EC_Q_AROUND, /* of a zone */
-  EC_Q_SPREAD_ALONG, EC_Q_SPREAD_AROUND, EC_Q_SLANT, EC_Q_LENGTH, EC_Q_WIDTH, EC_Q_STIFFNESS,
-  EC_QUANTITIES,
-  EC_Q_REGION_MAX_FORCE = EC_QUANTITIES, EC_Q_REGION_AREA, EC_Q_REGION_MOTION,
-  EC_Q_REGION_FORCE_MOTION, EC_Q_TAXEL_FORCE, EC_Q_JOINT_ANGLE, EC_Q_JOINT_CHANGE,
-  EC_Q_TAXEL_KERNELS, EC_Q_ZONE_KERNELS
-};
+/* model.c: the features, by the names of edge/features/names.py */
 enum { EC_T_NONE, EC_T_LOG, EC_T_SQRT, EC_T_RELATIVE };
 enum { EC_S_, EC_S_RATE, EC_S_MEAN, EC_S_DEVIATION, EC_S_ROUGHNESS };
 

@@ -34,12 +34,15 @@
 #define EC_FORCE_MOTION $force_motion
 #define EC_CENTROIDS $centroids
 #define EC_SPREADS $spreads
+#define EC_SURE_VALUES \
+  $sure_values
 #define EC_COURSES $courses_count
 #define EC_VALUES $value_count
 #define EC_ZONE_CHANNELS $zone_channels
 #define EC_CHANNELS $channels
 
-/* the features */
+/* the features, and the quantities of edge/features/quantities.py */
+enum { $quantity_names };
 #define EC_FEATURES $features_count
 #define EC_WIDTH $width
 #define EC_FORCE_FLOOR $force_floor

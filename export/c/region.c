@@ -1,5 +1,5 @@
 /* The active taxels of a frame, the largest region of them, and the whole numbers of zones:
-   edge/touch/active.py, components.py, grid.py, zones.py. */
+   edge/touch/region.py, components.py, grid.py, edge/features/zones.py. */
 #include "internal.h"
 
 #define TAXELS (EC_ROWS * EC_COLS)

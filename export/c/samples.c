@@ -1,5 +1,5 @@
-/* A contact's frames to values at sample times, as they come: edge/touch/contact.py, features.py,
-   zones.py, kernels.py.
+/* A contact's frames to values at sample times, as they come: edge/touch/contact.py,
+   edge/features/vector.py, zones.py, kernels.py.
 
    Frames are not kept: between two frames in which a value is known, it is interpolated to the sample
    times that lie there. What follows a lift-off is written as if the contact were over, and written
@@ -42,41 +42,39 @@ static void spread(const int64_t *zone, double values[5]) {
   double larger = 0.5 * (rows + cols + ec_sqrt(across * across + 4.0 * slant * slant));
   double determinant = rows * cols - slant * slant;
   if (!(determinant > 0.0)) determinant = 0.0;
-  values[EC_Q_SPREAD_ALONG - EC_Q_SPREAD_ALONG] = ec_sqrt(rows);
-  values[EC_Q_SPREAD_AROUND - EC_Q_SPREAD_ALONG] = ec_sqrt(cols);
-  values[EC_Q_SLANT - EC_Q_SPREAD_ALONG] = slant;
-  values[EC_Q_LENGTH - EC_Q_SPREAD_ALONG] = ec_sqrt(larger);
-  values[EC_Q_WIDTH - EC_Q_SPREAD_ALONG] = ec_sqrt(larger > 0.0 ? determinant / larger : 0.0);
+  values[0] = ec_sqrt(rows);
+  values[1] = ec_sqrt(cols);
+  values[2] = slant;
+  values[3] = ec_sqrt(larger);
+  values[4] = ec_sqrt(larger > 0.0 ? determinant / larger : 0.0);
 }
+
+static double spread_of(ec_row *row, uint32_t zone, uint32_t i) {
+  if (!EC_SPREADS) return 0.0;
+  if (!row->is_spread[zone]) spread(row->zones[zone], row->spreads[zone]);
+  row->is_spread[zone] = true;
+  return row->spreads[zone][i];
+}
+
+#define SPREAD(i) spread_of(row, course->zone, i)
 
 /* A value that is known in every frame. */
 static double sure_value(const ec_course *course, uint32_t index, ec_row *row) {
   const int64_t *zone = row->zones[course->zone];
-  double area = (double)zone[1];
   switch (course->quantity) {
-    case EC_Q_REGION_MAX_FORCE: return row->peak / EC_SCALE;
-    case EC_Q_REGION_AREA: return row->area;
-    case EC_Q_TAXEL_FORCE: return row->cells[index];
-    case EC_Q_MAX_FORCE: return (double)zone[0] / EC_SCALE;
-    case EC_Q_FORCE: return (double)zone[2] / EC_SCALE;
-    case EC_Q_AREA: return area;
-    case EC_Q_PRESSURE: return (double)zone[2] / ((area > 1.0 ? area : 1.0) * EC_SCALE);
-    default:
-      if (!EC_SPREADS) return 0.0;
-      if (!row->is_spread[course->zone]) spread(zone, row->spreads[course->zone]);
-      row->is_spread[course->zone] = true;
-      return row->spreads[course->zone][course->quantity - EC_Q_SPREAD_ALONG];
+    EC_SURE_VALUES
+    default: return 0.0;
   }
 }
 
 /* The place among what may be unknown; EC_UNSURE_VALUES of other quantities. */
 static uint32_t unsure_place(const ec_course *course) {
   switch (course->quantity) {
-    case EC_Q_ALONG: return 2u * course->zone;
-    case EC_Q_AROUND: return 2u * course->zone + 1;
+    case EC_Q_ZONE_ALONG: return 2u * course->zone;
+    case EC_Q_ZONE_AROUND: return 2u * course->zone + 1;
     case EC_Q_STIFFNESS: return EC_OF_STIFFNESS;
-    case EC_Q_REGION_MOTION: return EC_OF_MOTION;
-    case EC_Q_REGION_FORCE_MOTION: return EC_OF_FORCE_MOTION;
+    case EC_Q_CONTACT_MOTION: return EC_OF_MOTION;
+    case EC_Q_FORCE_MOTION: return EC_OF_FORCE_MOTION;
     case EC_Q_JOINT_ANGLE: return EC_OF_JOINTS;
     default: return EC_UNSURE_VALUES;
   }

@@ -19,7 +19,7 @@ from edge.demo import MODEL
 from tests.board.debian import CHECKOUT, once, program, run, skipping, unpacked
 from tests.checks.hard_cases import elsewhere
 from tests.checks.hard_cases import golden as hard_golden
-from tests.edge.touch.test_features import BITS
+from tests.edge.features.test_vector import BITS
 
 AARCH64 = CHECKOUT / "build" / "aarch64"
 pytestmark = pytest.mark.slow

@@ -14,7 +14,8 @@ from edge.errors import InputError
 from edge.record.recording import load
 from edge.record.saving import save
 from export import api, c_code
-from train.report.summary import names, warnings
+from train.notes import warnings
+from train.report.summary import names
 
 
 def test_a_fitted_model_is_saved_with_its_golden_outputs(fitted, tmp_path):

@@ -17,15 +17,15 @@ from edge.decide.info import Novelty, margin
 from edge.decide.model import Model
 from edge.elementary import logistic
 from edge.errors import InputError
-from edge.record.recording import Recording, load
+from edge.features.kernels import KernelTable, channels_of
+from edge.features.names import feature
+from edge.features.names import names as all_names
+from edge.features.quantities import KERNELS, OF_ZONES, Quantity
+from edge.record.recording import load
 from edge.record.saving import save
-from edge.touch import measures
-from edge.touch.feature import KERNELS
-from edge.touch.kernels import KernelTable, channels_of
 from edge.touch.layout import SkinLayout
-from edge.wire.skin.decoder import Baseline
-from edge.wire.skin.file import Signal
-from export import c_code
+from edge.wire.skin import file as skinfile
+from export import c_code, skin_code
 from tests.conftest import ROOT, ended, export, in_a_row, touch
 from tests.edge.decide.test_engines import hostile
 from tests.export.microcontroller import machine
@@ -41,6 +41,7 @@ from tests.export.microcontroller.recordings import (
     recordings_for,
 )
 from tests.export.test_early_stopping import pressed
+from train.data.feature_sets import expand, unit
 
 TOOLS = ("arm-none-eabi-gcc", "qemu-system-arm")
 needs_qemu = pytest.mark.skipif(
@@ -223,9 +224,9 @@ SKINS = [
 def spelled(rng):
     """Names of features of every kind, with transforms and summaries."""
     names = []
-    for name in measures.names():
+    for name in all_names():
         if name not in KERNELS and "shear" not in name:
-            signed = measures.feature(name).quantity in measures.SIGNED
+            signed = feature(name).quantity.signed
             prefixes = ["", "sqrt_", "relative_"]
             prefixes += [] if signed else ["log_", "log_relative_", "sqrt_log_"]
             prefix, second = rng.choice(prefixes, 2)
@@ -246,6 +247,32 @@ class NoGraph:
         self.places = {}
 
 
+def measuring(layout, features, **changes):
+    """The demo's model, of another skin and other features."""
+    model = Model(demo.MODEL)
+    model.info = replace(
+        model.info,
+        layout=layout,
+        features=features,
+        chain=model.info.chain if layout.wraps else None,
+        joints=5,
+        **changes,
+    )
+    return model
+
+
+def assert_same_vectors(model, recordings, folder, monkeypatch):
+    """The C of a model makes the vectors of Python."""
+    monkeypatch.setattr(c_code, "CompiledGraph", NoGraph)
+    c_code.export(model, folder)
+    questions = [
+        machine.about_recording(machine.VECTORS_OF_RECORDING, r) for r in recordings
+    ]
+    expected = [machine.vectors(model, [0], recording) for recording in recordings]
+    answers = machine.ask(machine.compiled(folder), folder, questions)
+    assert same(answers, np.concatenate(expected))
+
+
 @pytest.mark.slow
 @needs_gcc
 @pytest.mark.parametrize("skin", range(len(SKINS)))
@@ -254,70 +281,65 @@ def test_every_feature_of_damaged_recordings_has_the_same_bits(
 ):
     rng = np.random.default_rng(skin)
     layout = SKINS[skin]
-    model = Model(demo.MODEL)
     tables = {}
     for name, biases in KERNELS.items():
         shifts = rng.integers(-20, 3, channels_of(name, layout)).tolist()
         limits = rng.integers(-30, 99, biases).tolist()
         tables[name] = KernelTable(tuple(shifts), tuple(limits))
-    model.info = replace(
-        model.info,
-        layout=layout,
-        features=tuple(spelled(rng)),
+    model = measuring(
+        layout,
+        tuple(spelled(rng)),
         samples=int(rng.choice([2, 7, 8, 17, 40, 128])),
-        chain=model.info.chain if layout.wraps else None,
-        joints=5,
         kernels=tables,
         debounce=int(rng.integers(1, 4)),
     )
-    monkeypatch.setattr(c_code, "CompiledGraph", NoGraph)
-    c_code.export(model, tmp_path)
-    command = machine.compiled(tmp_path)
     recordings = [*recordings_for(layout, 25, rng), *on_the_edges(layout)]
-    questions = [
-        machine.about_recording(machine.VECTORS_OF_RECORDING, r) for r in recordings
-    ]
-    expected = [machine.vectors(model, [0], recording) for recording in recordings]
-    assert same(machine.ask(command, tmp_path, questions), np.concatenate(expected))
+    assert_same_vectors(model, recordings, tmp_path, monkeypatch)
+
+
+@needs_gcc
+def test_a_quantity_is_a_record_and_reaches_the_c(tmp_path, monkeypatch):
+    toy = Quantity(
+        "toy",
+        "{force}/taxel",
+        lambda zone: zone.peak / zone.taxels,
+        "(double)zone[0] / (double)(zone[1] > 1 ? zone[1] : 1)",
+    )
+    monkeypatch.setitem(OF_ZONES, toy.name, toy)
+    names = ("skin_toy", "log_left_toy@5", "sqrt_contact_toy_mean")
+    assert {"skin_toy", "left_toy"} < set(all_names())
+    assert len(expand(["moments"])) == 30  # it names its members
+    assert unit(feature("skin_toy_rate"), SKINS[2]) == "newton/taxel/s"
+    model = measuring(SKINS[2], (*names, "skin_width"))
+    recordings = recordings_for(SKINS[2], 2, np.random.default_rng(1))
+    assert_same_vectors(model, recordings, tmp_path, monkeypatch)
 
 
 @needs_gcc
 @pytest.mark.skipif(shutil.which("g++") is None, reason="there is no C++ compiler")
-def test_the_sketch_suits_the_header(tmp_path, monkeypatch):
+def test_the_sketch_suits_the_headers_with_a_model_and_without(tmp_path, monkeypatch):
     """Checked against the declarations of Arduino's core."""
     model = Model(demo.MODEL)
-    model.info = replace(model.info, layout=SkinLayout(1, 12))
+    skin = skinfile.load(skinfile.shipped("electrodes"))
+    model.info = replace(model.info, layout=SkinLayout(*skin.layout.shape))
     monkeypatch.setattr(c_code, "CompiledGraph", NoGraph)
-    c_code.export(model, tmp_path)
-    shutil.copy(ROOT / "tests" / "arduino.h", tmp_path / "Wire.h")
+    for name in ("Wire.h", "EEPROM.h"):
+        shutil.copy(ROOT / "tests" / "arduino.h", tmp_path / name)
+    skin_code.export(skin, tmp_path)
     sketch = ROOT / "docs" / "examples" / "firmware" / "decide" / "decide.ino"
-    command = ["g++", "-std=c++11", "-Wall", "-fsyntax-only", f"-I{tmp_path}", "-xc++"]
-    compiled = ended(*command, sketch)
-    assert compiled.returncode == 0, compiled.stderr
-
-
-@pytest.mark.slow
-@needs_gcc
-def test_the_baseline_follows_as_pythons(tmp_path):
-    rng = np.random.default_rng(9)
-    layout = Model(demo.MODEL).info.layout
-    walk = rng.integers(-4, 5, (80, *layout.shape)).cumsum(axis=0) + 30000
-    frames = np.clip(walk + np.arange(80)[:, None, None], 0, 65535).astype(np.uint16)
-    valid = rng.random(frames.shape) < 0.9
-    recording = Recording(np.arange(80.0), frames, valid=valid)
-    signal = Signal(
-        drift_counts_per_s=300 / 4096, drift_limit_counts=20, dead_band_counts=3
-    )
-    baseline = Baseline(signal, 1.0, frames[0].ravel(), sign=-1)
-    expected = []
-    for raw, readable in zip(frames, valid, strict=True):
-        expected.append(baseline.above(raw.ravel()))
-        baseline.follow(raw.ravel(), readable.ravel())
-    c_code.export(Model(demo.MODEL), tmp_path)
-    question = machine.about_recording(machine.BASELINE, recording)
-    answer = machine.ask(machine.compiled(tmp_path), tmp_path, [question])
-    assert answer.tolist() == np.concatenate(expected).tolist()
-    assert np.unique(answer).size > 10
+    command = [
+        "g++",
+        "-std=c++11",
+        "-Wall",
+        "-Werror",
+        "-fsyntax-only",
+        f"-I{tmp_path}",
+        "-xc++",
+    ]
+    for write in (lambda: None, lambda: c_code.export(model, tmp_path)):
+        write()
+        compiled = ended(*command, sketch)
+        assert compiled.returncode == 0, compiled.stderr
 
 
 RATES = (50, 100, 125, 200, 500, 1000)

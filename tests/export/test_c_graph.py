@@ -9,7 +9,7 @@ from export.build import smallest
 from export.c_graph import TYPES, CompiledGraph
 from export.graph import to_onnx
 from tests.checks.hard_cases.models import describe
-from tests.edge.decide.test_engines import hostile
+from tests.edge.decide.test_engines import assert_same_bits, hostile
 from tests.export.microcontroller.comparison import assert_same, needs_gcc
 from tests.export.test_graph import fit, hard_set
 from train.model.pipeline import Choice
@@ -51,6 +51,7 @@ def test_a_random_models_graph_has_the_same_bits_of_hostile_vectors(tmp_path, se
     path = tmp_path / "model.onnx"
     path.write_bytes(to_onnx(fitted, describe(fitted, samples=8)))
     vectors = [*queries, *hostile(24, rng), *hostile_blends(X, 500, rng)]
+    assert_same_bits(path, vectors)
     assert_same(Model(path), tmp_path / "c", [], vectors)
 
 

@@ -16,8 +16,8 @@ from edge.decide.events import Decided
 from edge.decide.model import Model
 from edge.decide.verify import first_series, verify
 from edge.errors import InputError, OutOfRange
+from edge.features.vector import FEATURES
 from edge.record.saving import save
-from edge.touch.features import FEATURES
 from export.api import save as save_model
 from tests.checks.hard_cases import exact
 from tests.checks.hard_cases.models import session
@@ -26,7 +26,7 @@ from tests.edge.decide.test_engines import assert_same_bits, hostile
 from tests.sequential import fitted_model
 from train.data.dataset import load_trials
 from train.model.pipeline import Choice
-from train.model.stopping import Early
+from train.model.stopping import EarlySettings
 
 LABELS = {"t": np.array(["a", "b", "c"] * 15), "u": np.array(["x", "y", "y"] * 15)}
 """Labels of 45 trials for two tasks."""
@@ -106,7 +106,7 @@ def with_early_settings(early, tmp_path_factory):
         "t": Choice("IV", 6, 3, features=area),
         "u": Choice("IV", 2, 3, features=area),
     }
-    settings = Early(at_first, [at_first] * 10)
+    settings = EarlySettings(at_first, [at_first] * 10)
     path = tmp_path_factory.mktemp("early") / "model.onnx"
     return X, *fitted_model(path, early.info, choices, X, LABELS, settings)
 
@@ -353,11 +353,11 @@ def test_the_board_decides_as_the_trials_that_certified_its_rules_were(
         task: np.array([recording.labels[task] for recording in recordings])
         for task in model.info.tasks
     }
-    _, _, courses = fitted.sequential.judged(np.array(vectors), truth)
+    _, _, series = fitted.sequential.judged(np.array(vectors), truth)
     error = max(of.rules[0].error for of in model.info.stopping.values())
     events = [decided(model, recording, error) for recording in recordings]
-    for task, course in courses.items():
-        at, wrong = course.under(fastest(model.info.stopping[task], error))
+    for task, time_series in series.items():
+        at, wrong = time_series.under(fastest(model.info.stopping[task], error))
         answers = zip(events, at, wrong, truth[task], strict=True)
         for event, point, is_wrong, label in answers:
             assert event[task].window_s == model.decision_points_s[point]

@@ -61,7 +61,7 @@ def line_of(printed, task):
 
 
 def test_it_prints_the_accuracy_of_each_task(printed):
-    share = "of 16 trials are classified correctly (95 % interval "
+    share = "of 16 trials are right (95 % interval "
     assert share in line_of(printed, "object")
     low, high = wilson(6.4, 6.4)
     interval = f"{share}{100 * low:.0f} to {100 * high:.0f})"
@@ -232,7 +232,7 @@ def test_a_former_model_in_the_same_place_is_compared_as_it_was(
         (["--test", "loop"], "loop: cannot be read: Too many levels of symbolic links"),
         (["--test", "x.npz", "--compare", "old.onnx"], "old.onnx: no such model"),
         (["--compare", "old.onnx"], "--compare needs --test"),
-        (["--flash", "512"], "--c-error and --flash need --c"),
+        (["--flash", "512"], "--c-error, --flash and --skin need --c"),
     ],
 )
 def test_held_out_recordings_and_a_former_model_are_checked_before_any_work(

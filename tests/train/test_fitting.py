@@ -36,7 +36,7 @@ def test_a_data_set_can_be_given_and_single_trials_left_out(recordings):
         "scaling": "IV",
     }
     fitted = train.fit(data, **fixed, leave_out="trial", decision_points_s=(), jobs=1)
-    assert fitted.chosen["category"].left_out == "trial"
+    assert fitted.chosen["category"].held_out == "trial"
     assert not any("--leave-out trial" in note for note in fitted.notes)
     assert fitted.sequential is None
     labels = fitted.classifier.decide(fitted.X)["category"].labels
@@ -55,12 +55,12 @@ def test_whole_objects_are_left_out_where_every_class_has_three(make_touch, tmp_
             )
     fitted = train.fit(str(tmp_path), **PAPER)
     settings = fitted.chosen["category"]
-    assert settings.left_out == "object"
+    assert settings.held_out == "object"
     assert any("`--leave-out trial` chooses" in note for note in fitted.notes)
     # The 18 trials count as much as their six objects do.
     assert settings.accuracy.variance == 3.0
     assert settings.by_trial.variance == VARIANCE
-    assert fitted.chosen["object"].left_out == "trial"
+    assert fitted.chosen["object"].held_out == "trial"
     # The folds have all labels of the task that has the most of them.
     folds = stratified_folds(fitted.dataset.labels("object"))
     assert (fitted.chosen["object"].folds == folds).all()

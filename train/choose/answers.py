@@ -87,7 +87,7 @@ class _Fit:
 def answers_without(
     vectors: Vectors,
     classes: Mapping[str, Integers],
-    left_out: Booleans,
+    held_out: Booleans,
     grids: Sequence[SearchGrid],
 ) -> dict[str, NDArray[Any]]:
     """{task: (candidates, test) whether each candidate is right} of the fit without
@@ -97,7 +97,7 @@ def answers_without(
     answer is right, and the more, the more clearly the right label is nearest
     (`clearness`).
     """
-    fit = _Fit(vectors, classes, np.flatnonzero(~left_out), np.flatnonzero(left_out))
+    fit = _Fit(vectors, classes, np.flatnonzero(~held_out), np.flatnonzero(held_out))
     answers: dict[str, list[NDArray[Any]]] = {}
     decomposed = None
     with single_thread():

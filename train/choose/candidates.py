@@ -9,6 +9,7 @@ from itertools import product
 import numpy as np
 
 from edge.arrays import Integers
+from train.choose.options import FitOptions
 from train.choose.search import NEIGHBOURS, SHRINKAGES, SearchGrid
 from train.data.feature_sets import expand
 from train.data.vectors import Labels
@@ -43,8 +44,8 @@ WITH_JOINTS = (
     ("kernels", "joints"),
     ("moments", "zone_kernels", "joints"),
 )
-"""Those for recordings with joint angles, whose changes show how far the thing gave
-way. The arm tells that a thing has begun to move before the skin does, and roots let a
+"""Those for recordings with joint angles, whose changes show how far the object gave
+way. The arm tells that an object has begun to move before the skin does, and roots let a
 small motion count."""
 WITH_SHEAR = (
     ("contact", "shear"),
@@ -61,15 +62,15 @@ OF_SKIN = (
     ("sqrt_taxels", "kernels"),
 )
 OF_JOINTS = (("joints",), ("joints", "posture"))
-"""For known things, each of `OF_SKIN` is a candidate with each of these, and with shear
+"""For known objects, each of `OF_SKIN` is a candidate with each of these, and with shear
 and without, where the recordings have them."""
 DRAWN = ("contact",)
 DRAWN_WITH_JOINTS = ("contact", "joints")
-"""The combination tried for touches of simulated things that are drawn from kinds
+"""The combination tried for touches of simulated objects that are drawn from kinds
 (`kinds_of`). Joint angles at onset and single taxels say how the scene is built.
-Moments say how large and of what form a contact is, in which simulators of soft things
+Moments say how large and of what form a contact is, in which simulators of soft objects
 differ most. How far the contact turns the joints back is a second measure of how the
-thing gives way, whatever the skin."""
+object gives way, whatever the skin."""
 QUICK = 3
 """Combinations tried by a quick choice, from the first on."""
 COMPONENTS = (1, 2, 3, 4, 5, 6, 8, 10, 14, 20)
@@ -78,7 +79,7 @@ FEW_NEIGHBOURS = (1, 3, 5)
 PAPER_SCALINGS = ("none", "I", "IV", "V")
 DRAWN_SHRINKAGES = (1.0, 0.3)
 DRAWN_COMPONENTS = (1, 2, 3, 4, 6, 8, 10)
-"""Those tried for touches of simulated things of several kinds, and the most
+"""Those tried for touches of simulated objects of several kinds, and the most
 discriminants. Another physics differs most in differences that are small beside the
 features' spread."""
 
@@ -91,7 +92,7 @@ class Candidate:
         sets: names of feature sets and of single features.
         projection: one of `train.model.projection.KINDS`.
         grids: the settings tried with them.
-        known: whether it is tried for known things alone, where no groups are left out.
+        known: whether it is tried for known objects alone, where no groups are left out.
     """
 
     sets: tuple[str, ...]
@@ -110,45 +111,16 @@ def features_of(candidates: Sequence[Candidate]) -> tuple[str, ...]:
     return expand([name for candidate in candidates for name in candidate.sets])
 
 
-@dataclass(frozen=True)
-class Fixed:
-    """Settings that are not to be chosen; those that are None are.
-
-    Attributes:
-        features: names of sets and of single features.
-        projection: one of `train.model.projection.KINDS`.
-        scaling: one of `train.model.scaling.SCALINGS`.
-        components: coordinates.
-        k: neighbours.
-    """
-
-    features: Sequence[str] | None = None
-    projection: str | None = None
-    scaling: str | None = None
-    components: int | None = None
-    k: int | None = None
-
-    @property
-    def asks(self) -> bool:
-        """Whether features or a projection are asked for."""
-        return self.features is not None or self.projection is not None
-
-    def thorough(self, kind: str) -> bool:
-        """Whether more numbers are tried, as features are asked for by name."""
-        return self.features is not None and kind == "pca"
-
-
-CHOOSE_ALL = Fixed()
+CHOOSE_ALL = FitOptions()
 
 
 def candidates(
     y: Labels,
-    fixed: Fixed = CHOOSE_ALL,
+    fixed: FitOptions = CHOOSE_ALL,
     *,
     joints: bool = False,
     shear: bool = False,
     drawn: bool = False,
-    quick: bool = False,
 ) -> list[Candidate]:
     """Every candidate with the settings that are held fixed.
 
@@ -159,7 +131,7 @@ def candidates(
     neighbours. Where `kinds_of` names kinds (`drawn`) only what carries over to other
     skins and arms is tried.
     """
-    mode = Mode.drawn(joints) if drawn else Mode.all_others(joints, shear, quick)
+    mode = Mode.drawn(joints) if drawn else Mode.all_others(joints, shear, fixed.quick)
     mode = mode.asked(fixed)
     projections = KINDS if fixed.projection is None else (fixed.projection,)
     every = dict.fromkeys((*mode.usual, *mode.known))
@@ -179,7 +151,7 @@ class Mode:
 
     Attributes:
         usual: feature sets that are tried together.
-        known: those that are tried for known things besides.
+        known: those that are tried for known objects besides.
         shrinkages: of discriminants.
         components: numbers of coordinates.
         most_directions: of discriminants; None for all.
@@ -197,7 +169,7 @@ class Mode:
 
     @classmethod
     def drawn(cls, joints: bool) -> Mode:
-        """The mode of things that a scene drew from kinds."""
+        """The mode of objects that a scene drew from kinds."""
         return cls(
             usual=[DRAWN_WITH_JOINTS if joints else DRAWN],
             known=[],
@@ -224,7 +196,7 @@ class Mode:
             together=True,
         )
 
-    def asked(self, fixed: Fixed) -> Mode:
+    def asked(self, fixed: FitOptions) -> Mode:
         """The same mode, with the features that are asked for in place of others."""
         if not fixed.asks:
             return self
@@ -235,7 +207,7 @@ class Mode:
         """Whether a projection of some feature sets is tried by default.
 
         Discriminants are not, for the paper's few features. A quick choice tries
-        discriminants alone for the others. So does one for simulated things, because
+        discriminants alone for the others. So does one for simulated objects, because
         principal components do not hold back the coordinates in which simulators
         differ.
         """
@@ -254,7 +226,9 @@ def _beside_every_other(joints: bool, shear: bool) -> list[tuple[str, ...]]:
     ]
 
 
-def _grid(sets: tuple[str, ...], kind: str, fixed: Fixed, mode: Mode) -> SearchGrid:
+def _grid(
+    sets: tuple[str, ...], kind: str, fixed: FitOptions, mode: Mode
+) -> SearchGrid:
     """The numbers that are tried for some feature sets and a projection."""
     neighbours = NEIGHBOURS if fixed.thorough(kind) else FEW_NEIGHBOURS
     components = mode.components if fixed.components is None else (fixed.components,)
@@ -281,7 +255,7 @@ def _with_targets(grid: SearchGrid, y: Labels, mode: Mode) -> list[SearchGrid]:
 def _scaled(
     grids: Sequence[SearchGrid],
     sets: Sequence[str],
-    fixed: Fixed,
+    fixed: FitOptions,
     mode: Mode,
 ) -> tuple[SearchGrid, ...]:
     """The grids with each method of scaling that is tried.

@@ -10,8 +10,8 @@ import numpy as np
 from edge.arrays import Booleans, Floats, Integers
 from train.choose.candidates import Candidate
 from train.choose.early import by_folds, early_options, points_of, settle_early
-from train.choose.evaluate import Halving, Promise, Result, evaluate, fits
-from train.choose.protocols import Protocol, Protocols, promised, rule_among
+from train.choose.evaluate import Halving, NestedAccuracy, Result, evaluate, fits
+from train.choose.protocols import Protocol, Protocols, nested_accuracy, rule_among
 from train.choose.rule import MOST_ACCURATE, Rule
 from train.choose.search import SearchGrid
 from train.choose.settings import Chosen, Settings
@@ -21,25 +21,21 @@ from train.data.vectors import Labels, Vectors
 from train.model.agreement import families
 from train.model.held_out import held_out
 from train.model.pipeline import Choice, Choices
-from train.model.stopping import Early
+from train.model.stopping import EarlySettings
 from train.progress import bar
-
-SECOND_WORTH = 0.005
-"""Accuracy that is worth a second of waiting."""
-
 
 Plan = tuple[Integers, Sequence[Choices]]
 """(n,) the fold of each trial, and [fold]{task: the choice made without its trials}."""
 
 
 class Choosing:
-    """Chooses the window, and each task's settings, among candidates.
+    """Chooses each task's settings among candidates.
 
     Args:
         dataset: measured for every candidate.
         y: {task: (n,) labels}.
         candidates: what is tried.
-        divisions: the trials that are left out together.
+        divisions: the trials that are held out together.
         samples: values of a feature.
         jobs: processes.
         progress: show progress bars on stderr.
@@ -81,7 +77,7 @@ class Choosing:
         return dataset.vectors(window_s, self._samples, self._y)
 
     def _protocols(self, vectors: Vectors, heading: str, *, nested: bool) -> Protocols:
-        """The choices by the candidates' answers to what is left out."""
+        """The choices by the candidates' answers to what is held out."""
         folds = self._divisions.folds
         further_folds = self._divisions.further
         by_trial, by_group = self._grids(graded=self._is_few and nested)
@@ -117,7 +113,7 @@ class Choosing:
         return Protocols(by_trials, by_groups, shared)
 
     def _grids(self, graded: bool) -> tuple[list[SearchGrid], list[SearchGrid]]:
-        """The grids tried with trials left out, and those tried with groups left out,
+        """The grids tried with trials held out, and those tried with groups held out,
         for which the tasks that share their settings share a space.
 
         Args:
@@ -133,7 +129,7 @@ class Choosing:
                 by_trial += for_tasks(grid, self._sharing)
         return by_trial, [g for grid in shared for g in for_tasks(grid, self._sharing)]
 
-    def _right(self, window_s: float) -> dict[str, Floats]:
+    def right(self, window_s: float) -> dict[str, Floats]:
         """{task: the shares of right answers to each trial, of the candidate that is
         best in plain cross-validation}."""
         vectors = self._vectors(window_s)
@@ -146,58 +142,20 @@ class Choosing:
             right[task] = protocol.answers(task, shared=False)[place, tested]
         return right
 
+    def shares(self, window_s: float) -> dict[str, float]:
+        """{task: share of right answers} in plain cross-validation."""
+        right = self.right(window_s)
+        return {task: float(of_task.mean()) for task, of_task in right.items()}
+
     def accuracy(self, window_s: float) -> float:
         """Mean accuracy of the tasks in plain cross-validation; missed touches count as
         wrong."""
         accuracies = []
-        for task, right in self._right(window_s).items():
+        for task, right in self.right(window_s).items():
             result = Result(round(right.sum()), len(right))
             untouched = self._dataset.untouched_labels(task)
-            accuracies.append(promised(result, untouched).accuracy)
+            accuracies.append(nested_accuracy(result, untouched).accuracy)
         return sum(accuracies) / len(accuracies)
-
-    def window(
-        self, windows: Sequence[float], second_worth: float = SECOND_WORTH
-    ) -> tuple[float, list[str]]:
-        """The window with the best mean accuracy of the tasks in plain cross-validation,
-        less what the wait is worth.
-
-        Args:
-            windows: in seconds, rising.
-            second_worth: accuracy that is worth a second of waiting.
-
-        Returns:
-            The window in seconds, and sentences that say why, and what a longer one
-            gains.
-        """
-        if len(windows) == 1:
-            return windows[0], []
-        by_window = [self._right(window_s) for window_s in windows]
-        means = {
-            task: np.array([right[task].mean() for right in by_window])
-            for task in self._y
-        }
-        worth = np.mean(list(means.values()), axis=0)
-        worth -= second_worth * np.array(windows)
-        place = int(worth.argmax())
-        shares = []
-        gains = []
-        for task, of_task in means.items():
-            accuracies = zip(of_task, windows, strict=True)
-            shares.append(
-                f"{task} {', '.join(f'{a:.0%} at {w:g} s' for a, w in accuracies)}"
-            )
-            best = int(of_task.argmax())
-            if best > place:
-                gains.append(
-                    f"--window {windows[best]:g}: {task} {of_task[best]:.0%} instead of "
-                    f"{of_task[place]:.0%} in cross-validation"
-                )
-        note = (
-            f"the window is {windows[place]:g} s: a second of waiting counts as "
-            f"{100 * second_worth:g} points of accuracy; in cross-validation "
-        )
-        return windows[place], [f"{note}{'; '.join(shares)} (--window sets it)", *gains]
 
     def choose(self, window_s: float) -> Settings:
         """Each task's settings."""
@@ -216,13 +174,13 @@ class Choosing:
             by_group = {task: groups.by_fold(task) for task in groups.sharing}
             plans[groups.name] = groups.folds, by_folds(by_group)
         together = decided_together(chosen, vectors, plans, self._jobs)
-        return Settings(together, trials.folds, without, self.candidates, window_s, [])
+        return Settings(together, trials.folds, without, self.candidates, window_s)
 
     def early(
         self,
         window_s: float,
         chosen: Mapping[str, Chosen],
-    ) -> Early | None:
+    ) -> EarlySettings | None:
         """The settings of the decision points before the full window; None where no
         candidate has discriminants."""
         full = {task: settings.choice for task, settings in chosen.items()}
@@ -253,26 +211,25 @@ class Choosing:
         """
         untouched = self._dataset.untouched_labels(task)
         groups = protocol.count(self._y[task])
-        promise = partial(promised, untouched=untouched, groups=groups)
+        nested = partial(nested_accuracy, untouched=untouched, groups=groups)
         of_candidates = [
             protocol.of_candidate(task, candidate) for candidate in self.candidates
         ]
-        accuracy = promise(protocol.accuracy(task))
+        accuracy = nested(protocol.accuracy(task))
         by_trial = accuracy
         if protocol.groups is not None:
-            # `decided_together` counts the answers to left-out trials.
+            # `decided_together` counts the answers to held-out trials.
             total = int((trial_folds >= 0)[self._y[task] != ""].sum())
             none_right = Result(0, total, hits=np.zeros(total, dtype=bool))
-            by_trial = promised(none_right, untouched)
+            by_trial = nested_accuracy(none_right, untouched)
         return Chosen(
             choice=protocol.choice(task),
             accuracy=accuracy,
             by_trial=by_trial,
-            left_out=protocol.name,
-            candidates=tuple(best and promise(best[0]) for best in of_candidates),
+            held_out=protocol.name,
+            candidates=tuple(best and nested(best[0]) for best in of_candidates),
             picks=tuple(best and best[1] for best in of_candidates),
             folds=protocol.folds,
-            agreed=protocol.agreed(task),
         )
 
 
@@ -312,7 +269,7 @@ def decided_together(
     Args:
         chosen: {task: its settings}, with the accuracies of the task by itself.
         vectors: (n, p) of the trials.
-        plans: {`left_out`: (n,) folds, and [fold]{task: the choice made without its
+        plans: {`held_out`: (n,) folds, and [fold]{task: the choice made without its
             trials}}.
         jobs: processes.
     """
@@ -321,17 +278,17 @@ def decided_together(
         together[task] = _planned(settings, plans, (task,))
     task_families = families(vectors.y)
     for task, settings in chosen.items():
-        if settings.left_out != TRIAL and not any(task in f for f in task_families):
+        if settings.held_out != TRIAL and not any(task in f for f in task_families):
             task_families.append((task,))
     for family in task_families:
         right = {}
-        for left_out in {TRIAL, *(chosen[task].left_out for task in family)}:
-            right[left_out] = _right_together(family, vectors, plans[left_out], jobs)
+        for name in {TRIAL, *(chosen[task].held_out for task in family)}:
+            right[name] = _right_together(family, vectors, plans[name], jobs)
         for task in family:
             settings = _planned(chosen[task], plans, family)
             together[task] = replace(
                 settings,
-                accuracy=_recounted(settings.accuracy, right[settings.left_out][task]),
+                accuracy=_recounted(settings.accuracy, right[settings.held_out][task]),
                 by_trial=_recounted(settings.by_trial, right[TRIAL][task]),
             )
     return together
@@ -343,7 +300,7 @@ def _planned(
     tasks: Sequence[str],
 ) -> Chosen:
     """A task's settings with `by_fold`, of the tasks that are decided together."""
-    _, by_fold = plans[settings.left_out]
+    _, by_fold = plans[settings.held_out]
     of_tasks = [_of_tasks(by_task, tasks) for by_task in by_fold]
     return replace(settings, by_fold=tuple(of_tasks))
 
@@ -353,7 +310,7 @@ def _of_tasks(choices: Choices, tasks: Sequence[str]) -> dict[str, Choice]:
     return {task: choices[task] for task in tasks}
 
 
-def _recounted(result: Promise, hits: Booleans) -> Promise:
+def _recounted(result: NestedAccuracy, hits: Booleans) -> NestedAccuracy:
     """A result with other answers to the same trials."""
     assert result.hits is not None
     more = int(hits.sum()) - int(result.hits.sum())

@@ -1,7 +1,7 @@
 """Exact leave-one-out accuracies for all numbers of components and of neighbours at
 once.
 
-For each trial left out, scaling and components are fitted on the others. One
+For each trial held out, scaling and components are fitted on the others. One
 decomposition serves all numbers of components, as squared distances are accumulated
 over components. One sort for each number of components serves all k, as votes are
 accumulated over k.
@@ -13,7 +13,7 @@ import numpy as np
 
 from edge.arrays import Booleans, Floats, Integers
 from edge.errors import InputError
-from edge.touch.features import FEATURES
+from edge.features.vector import FEATURES
 from train.data.vectors import Strings
 from train.model.projection import Grid, Spectrum, on_grid
 from train.model.scaling import centred_and_scaled, finite

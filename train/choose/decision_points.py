@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from edge.touch.features import WINDOW_S
+from edge.features.vector import WINDOW_S
 from train.choose.options import FitOptions
 from train.choose.settings import Settings
 from train.data.dataset import DataSet
@@ -12,8 +12,7 @@ from train.model.stopping import FEWEST
 
 STEPS_S = (0.1, 0.2, 0.3, 0.4, 0.6)
 """Steps between decision points. The first one that keeps the weights below
-`LARGEST_BYTES` is taken. With 0.1 s decisions come 30 to 40 ms sooner than with 0.2 s,
-at the same error (cody18, household)."""
+`LARGEST_BYTES` is taken."""
 FIRST_S = 0.2
 """The first decision point."""
 LARGEST_BYTES = 1_600_000
@@ -21,20 +20,15 @@ LARGEST_BYTES = 1_600_000
 
 
 def decision_points(
-    measured: DataSet,
-    settings: Settings,
-    options: FitOptions,
-    notes: list[str],
-) -> tuple[float, ...]:
-    """The decision points asked for, or the usual ones."""
+    measured: DataSet, settings: Settings, options: FitOptions
+) -> tuple[tuple[float, ...], list[str]]:
+    """The decision points asked for, or the usual ones, and sentences on them."""
     asked_s = options.decision_points_s
     if asked_s is None:
-        return usual_points(measured, settings, options.samples, notes)
-    if not asked_s:
-        notes.append(
-            "decisions carry no confidence, as the model has no decision points"
-        )
-    return tuple(asked_s)
+        return usual_points(measured, settings, options.samples)
+    if asked_s:
+        return tuple(asked_s), []
+    return (), ["decisions carry no confidence, as the model has no decision points"]
 
 
 def has_early_points(settings: Settings, options: FitOptions) -> bool:
@@ -45,28 +39,22 @@ def has_early_points(settings: Settings, options: FitOptions) -> bool:
 
 
 def usual_points(
-    dataset: DataSet,
-    settings: Settings,
-    samples: int,
-    notes: list[str],
-) -> tuple[float, ...]:
-    """The decision points of a model, where none are asked for.
-
-    There are none without calibration, and fewer where the model would be too large.
+    dataset: DataSet, settings: Settings, samples: int
+) -> tuple[tuple[float, ...], list[str]]:
+    """The decision points of a model, where none are asked for, and a sentence where
+    there are fewer: none without calibration, fewer where the model would be too large.
 
     Args:
         dataset: measured for every candidate.
         settings: of the model.
         samples: values of a feature.
-        notes: takes a sentence where there are fewer.
     """
     tested = settings.tested
     if tested < FEWEST:
-        notes.append(
+        return (), [
             "decisions carry no confidence and none is early: calibration needs at "
             f"least {FEWEST} trials, not {tested}"
-        )
-        return ()
+        ]
     dataset = dataset.of(sorted(settings.features()))
     for every_s in STEPS_S:
         # A long window has as many decision points as the usual one.
@@ -74,17 +62,15 @@ def usual_points(
         points = _rising(step_s, settings.window_s)
         size = _size(len(points), dataset, settings, samples)
         if size <= LARGEST_BYTES:
-            if every_s > STEPS_S[0]:
-                notes.append(
-                    f"{len(points)} decision points, one every {step_s:g} s, so that "
-                    "the model stays below 1.9 MB; --decision-points asks for more"
-                )
-            return tuple(points)
-    notes.append(
+            fewer = (
+                f"{len(points)} decision points, one every {step_s:g} s, so that the "
+                "model stays below 1.9 MB; --decision-points asks for more"
+            )
+            return tuple(points), [fewer] * (every_s > STEPS_S[0])
+    return (settings.window_s,), [
         "no decision points before the full window: they would make the model about "
         f"{size / 1e6:.1f} MB; --decision-points asks for them"
-    )
-    return (settings.window_s,)
+    ]
 
 
 def _size(points: int, dataset: DataSet, settings: Settings, samples: int) -> int:

@@ -1,12 +1,11 @@
 """The settings of the decision points before the full window.
 
 A candidate is judged by how often it errs when sure, as means over some mean times to
-decision, on trials that are left out. Accuracy at a fixed window does not tell
+decision, on trials that are held out. Accuracy at a fixed window does not tell
 candidates apart: which touches they are sure of differs more than how many they get
-right. Entire groups are not left out here, as rules are certified for things that are
-known. The discriminants of all tasks side by side, which serve known things best, are
-no worse for others (cody18: mobility at 0.6 s, objects left out, 16 % wrong against 22
-with a discriminant of its own).
+right. Entire groups are not held out here, as rules are certified for objects that are
+known. The discriminants of all tasks side by side, which serve known objects best, are
+no worse for others (docs/measured.md).
 """
 
 from __future__ import annotations
@@ -25,8 +24,8 @@ from train.data.vectors import Vectors
 from train.model.agreement import factors_of
 from train.model.held_out import HeldOut, held_out
 from train.model.pipeline import Choice, Choices
-from train.model.rules import Course
-from train.model.stopping import Early
+from train.model.rules import TimeSeries
+from train.model.stopping import EarlySettings
 
 SHARES = (1 / 6, 1 / 3, 1 / 2, 2 / 3, 5 / 6)
 """Parts of the full window at which candidates may decide when sure."""
@@ -57,7 +56,7 @@ class SureDecisions:
         parts: Collection[str],
         seconds: Floats,
     ) -> SureDecisions:
-        """The decisions by answers to left-out trials.
+        """The decisions by answers to held-out trials.
 
         Args:
             answered: at each decision point.
@@ -67,10 +66,12 @@ class SureDecisions:
         """
         margins = [answered.margins[part] for part in parts]
         unknown = np.zeros(margins[0].shape, dtype=bool)
-        course = Course(margins, [~answered.right[part] for part in parts], unknown)
+        time_series = TimeSeries(
+            margins, [~answered.right[part] for part in parts], unknown
+        )
         shares = np.linspace(0.0, 1.0, THRESHOLDS)
         decided = [
-            course.under(StoppingRule(1.0, 0.0, threshold, len(seconds) - 1))
+            time_series.under(StoppingRule(1.0, 0.0, threshold, len(seconds) - 1))
             for threshold in np.quantile(margins, shares).tolist()
         ]
         at, wrong = map(np.stack, zip(*decided, strict=True))
@@ -129,7 +130,7 @@ def settle_early(
     folds: Integers,
     jobs: int,
     heading: str = "",
-) -> Early:
+) -> EarlySettings:
     """The settings of the decision points before the full window: those of the option
     that errs least often when sure, as a mean over the tasks. All tasks share them, and
     so a space, which leaves room for more decision points.
@@ -143,9 +144,9 @@ def settle_early(
         heading: of a progress bar on stderr; empty for none.
     """
     y = vectors.y
-    left_out = stratified_folds(y[finest(y)], FOLDS)
+    fifths = stratified_folds(y[finest(y)], FOLDS)
     runs = [[[option] * len(vectors.X)] * FOLDS for option in options]
-    answered = held_out(vectors, left_out, runs, jobs, heading)
+    answered = held_out(vectors, fifths, runs, jobs, heading)
     factors = factors_of(y)
     decided = {
         task: [
@@ -163,7 +164,7 @@ def settle_early(
             errors += [of.error(means_s, tested) for of in decided[task]]
         chosen_without.append(options[int(errors.argmin())])
     choices, *by_fold = chosen_without
-    return Early(choices, by_fold)
+    return EarlySettings(choices, by_fold)
 
 
 def by_folds(choices: Mapping[str, Sequence[Choice]]) -> list[dict[str, Choice]]:

@@ -36,7 +36,7 @@ from train.choose.halving import (
     folds_near,
     rungs,
 )
-from train.choose.rule import MOST_ACCURATE, Rule
+from train.choose.rule import Rule
 from train.choose.search import SearchGrid
 from train.data.vectors import Strings, Vectors
 from train.model.pipeline import Choice
@@ -84,7 +84,7 @@ class Result:
 
 
 @dataclass(frozen=True)
-class Promise(Result):
+class NestedAccuracy(Result):
     """A nested accuracy with an interval for the exported model's accuracy on other
     trials.
 
@@ -135,7 +135,7 @@ class AnswerTable:
         tested: {task: (n,) whether a trial has a label and a fold}; all where a task
             has no entry.
         repeated: tables of the same candidates by other folds, whose answers to
-            left-out trials count in the choice by all trials.
+            held-out trials count in the choice by all trials.
         grids: {task: (candidates,) the number of each one's grid}.
         running: {task: (folds + 1, candidates) whether each runs in the choice without
             a fold, and in that by all trials}; all where a task has no entry. What was
@@ -250,20 +250,6 @@ class AnswerTable:
         return Result(int(hits.sum()), len(hits), usual.components, usual.k, hits=hits)
 
 
-def chosen_by_fold(
-    table: AnswerTable, task: str, rule: Rule = MOST_ACCURATE
-) -> list[int]:
-    """[fold] the candidate chosen without the trials of a fold, nor fits to them."""
-    return [rule.choose(table.nested(task, fold)) for fold in fold_numbers(table.folds)]
-
-
-def nested_accuracy(
-    table: AnswerTable, task: str, rule: Rule = MOST_ACCURATE
-) -> Result:
-    """The accuracy of the choice itself, with the numbers that it most often takes."""
-    return table.answered(task, chosen_by_fold(table, task, rule))
-
-
 def fold_numbers(folds: Integers) -> range:
     """The numbers of the folds (n,), from 0."""
     return range(int(folds.max()) + 1)
@@ -288,7 +274,7 @@ def evaluate(
 
     Args:
         vectors: (n, p) of the trials.
-        folds: (n,) from 0; -1 for trials that are never left out, nor tested.
+        folds: (n,) from 0; -1 for trials that are never held out, nor tested.
         grids: the candidates.
         jobs: processes.
         progress: called after each of the `fits`.

@@ -1,43 +1,149 @@
-"""The settings that a fit holds fixed, and the trials that it then measures."""
+"""The options of a fit, each written once: its name, type, range and help."""
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
-from functools import partial
+import argparse
+import re
+from collections.abc import Sequence
+from dataclasses import Field, dataclass, field, fields
+from typing import Any
 
 from joblib import cpu_count
 
-from edge.errors import InputError
+from edge.app.options import within
+from edge.features.quantities import ALONE, OF_ZONES
+from edge.features.vector import SAMPLES, WINDOW_S
+from edge.features.zones import ZONES
 from edge.touch.arm import Chain
-from edge.touch.features import SAMPLES
-from train.choose.candidates import CHOOSE_ALL, Fixed, candidates, features_of
-from train.choose.choose import SECOND_WORTH, Choosing
-from train.data import pieces, thresholds
-from train.data.contacts import Untouched
-from train.data.dataset import DataSet, Measurement, Recordings, load_trials
-from train.data.groups import LEAVE_OUT, Divisions, are_drawn, kinds_of
-from train.data.tasks import labels_of_tasks
-from train.data.vectors import Labels
+from train.data.feature_sets import SETS
+from train.data.groups import LEAVE_OUT, TRIAL
+from train.model.projection import KINDS
+from train.model.scaling import SCALINGS
+from train.model.stopping import FEWEST
+
+SECOND_WORTH = 0.005
+"""Accuracy that is worth a second of waiting."""
+must be asked for."""
+DECISION_POINTS = "0.2:1.2:0.1"
+LONGEST_S = 60.0
+"""Longest window, and longest time that a contact may be away."""
+count = within(int, 1, 1_000_000)
+counts = within(int, 0, 65534)
+seconds = within(float, 0.01, LONGEST_S)
+"""The types of options that take a whole number, counts of a taxel, or seconds."""
+
+
+def taxel(text: str) -> tuple[int, int]:
+    """The row and column of a taxel.
+
+    Raises:
+        ArgumentTypeError: the text is no taxel.
+    """
+    place = re.fullmatch(r"([0-9]{1,4}),([0-9]{1,4})", text)
+    if place is None:
+        raise argparse.ArgumentTypeError(
+            f"must be ROW,COL, such as 3,5, not {text[:40]!r}"
+        )
+    return int(place[1]), int(place[2])
+
+
+def option(default: Any, text: str, flags: str | None = "", **how: Any) -> Any:
+    """A field with its help, and how argparse takes it: by its own name, or by other
+    `flags`; None for an option of `train.fit` alone."""
+    return field(default=default, metadata={"help": text, "flags": flags, **how})
 
 
 @dataclass(frozen=True, kw_only=True)
-class FitOptions(Fixed):
-    """The settings that a fit holds fixed; it chooses the others."""
+class FitOptions:
+    """What a fit holds fixed; it chooses what is None."""
 
-    window_s: float | None = None
-    second_worth: float = SECOND_WORTH
-    samples: int = SAMPLES
-    tasks: Sequence[str] | None = None
-    leave_out: str = LEAVE_OUT
-    decision_points_s: Sequence[float] | None = None
-    threshold: int | None = None
-    onset: int | None = None
-    release: float | None = None
-    arm: Chain | None = None
-    dead: Sequence[tuple[int, int]] = ()
-    quick: bool = False
-    skip_damaged: bool = False
-    jobs: int | None = None
-    progress: bool = False
+    tasks: Sequence[str] | None = option(
+        None,
+        "keys of the labels to decide (default: all that the recordings share)",
+        nargs="+",
+        metavar="TASK",
+    )
+    features: Sequence[str] | None = option(
+        None,
+        f"features to measure, instead of a choice: sets ({', '.join(SETS)}) and single "
+        f"features, ZONE_QUANTITY of {', '.join(ZONES)} and "
+        f"{', '.join(OF_ZONES)}, or {', '.join(ALONE)}",
+        nargs="+",
+        metavar="NAME",
+    )
+    projection: str | None = option(
+        None, "projection: principal components or discriminants", choices=KINDS
+    )
+    scaling: str | None = option(
+        None, "scaling (paper, Eqs. 1 to 5; or by column)", choices=SCALINGS
+    )
+    components: int | None = option(None, "number of principal components", type=count)
+    k: int | None = option(None, "number of neighbours", "-k --k", type=count)
+    leave_out: str = option(
+        LEAVE_OUT,
+        "label whose groups are held out to choose the settings of a task and to "
+        "measure its accuracy, where each of its classes has several groups (default: "
+        f"{LEAVE_OUT}); `{TRIAL}` holds out single trials",
+        metavar="KEY",
+    )
+    quick: bool = option(
+        False, "few candidates and five folds, for a first look", action="store_true"
+    )
+    skip_damaged: bool = option(
+        False,
+        "recordings that cannot be read are named and left out",
+        action="store_true",
+    )
+    window_s: float | None = option(
+        None,
+        "seconds from onset that a decision is based on (default: "
+        f"{WINDOW_S:g}, or more if touches last longer and the gain is worth the wait)",
+        "--window",
+        type=seconds,
+    )
+    second_worth: float = option(
+        SECOND_WORTH,
+        "accuracy that a second of waiting is worth where the window is chosen "
+        f"(default: {SECOND_WORTH:g})",
+        type=within(float, 0.0, 1.0),
+    )
+    decision_points_s: Sequence[float] | None = option(
+        None,
+        "seconds from onset at which decisions before the full window are calibrated "
+        "(edge-classify run --error), as a range or a list a,b,c, or `none` (default: "
+        f"{DECISION_POINTS} from {FEWEST} trials on, and fewer points if the model would "
+        "exceed 1.9 MB)",
+        "--decision-points",
+        metavar="A:B:STEP",
+    )
+    threshold: int | None = option(
+        None, "counts above which a taxel is in contact", type=counts
+    )
+    onset: int | None = option(None, "counts above which a contact begins", type=counts)
+    release: float | None = option(
+        None,
+        "seconds that a contact may be away and go on (default: the skin's, or longer "
+        "if many touches are fragmented and that is much more accurate)",
+        type=seconds,
+    )
+    dead: Sequence[tuple[int, int]] = option(
+        (),
+        "broken taxels that are ignored, counted from 0",
+        nargs="+",
+        type=taxel,
+        metavar="ROW,COL",
+    )
+    jobs: int | None = option(None, "processes (default: all cores)", type=count)
+    samples: int = option(SAMPLES, "values of a feature", None)
+    arm: Chain | None = option(None, "arm of joint angles that name none", None)  # noqa: RUF009
+    progress: bool = option(False, "progress bars on stderr", None)
+
+    @property
+    def asks(self) -> bool:
+        """Whether features or a projection are asked for."""
+        return self.features is not None or self.projection is not None
+
+    def thorough(self, kind: str) -> bool:
+        """Whether more numbers are tried, as features are asked for by name."""
+        return self.features is not None and kind == "pca"
 
     @property
     def processes(self) -> int:
@@ -51,128 +157,23 @@ class FitOptions(Fixed):
             return self.decision_points_s[-1]
         return self.window_s
 
-    def choosing(self, dataset: DataSet, y: Labels, *, drawn: bool) -> Choosing:
-        """The choice of the settings of some trials.
 
-        Raises:
-            InputError: `k` is not possible where some of them are left out.
-        """
-        divisions = Divisions.of(dataset, y, self.leave_out, self.quick)
-        most = divisions.fewest_left
-        if self.k is not None and not 1 <= self.k <= most:
-            raise InputError(
-                f"k must be 1 to {most}, the trials that remain of "
-                f"{len(divisions.folds)} where some are left out, not {self.k}"
-            )
-        tried = candidates(
-            y,
-            self,
-            joints=dataset.joints > 0,
-            shear=dataset.layout.axes is not None,
-            drawn=drawn,
-            quick=self.quick,
-        )
-        return Choosing(
-            dataset,
-            y,
-            tried,
-            divisions,
-            self.samples,
-            self.processes,
-            self.progress,
-        )
+OF_COMMAND: tuple[Field[Any], ...] = tuple(
+    of_fit for of_fit in fields(FitOptions) if of_fit.metadata["flags"] is not None
+)
+"""The options of a fit that `edge-classify export` takes."""
 
 
-@dataclass(frozen=True)
-class Loaded:
-    """The trials of a fit.
-
-    Attributes:
-        dataset: with the features of every candidate.
-        windows: that may be chosen, the usual one first.
-        notes: sentences that a user should read.
-    """
-
-    dataset: DataSet
-    windows: tuple[float, ...]
-    notes: list[str]
+def add_options(parser: argparse.ArgumentParser) -> None:
+    """Add the options of a fit, under the names of their fields."""
+    for of_fit in OF_COMMAND:
+        how = dict(of_fit.metadata)
+        flags = how.pop("flags") or f"--{of_fit.name.replace('_', '-')}"
+        how |= {"dest": of_fit.name, "default": of_fit.default}
+        parser.add_argument(*flags.split(), **how)
 
 
-def features_tried(
-    recordings: Recordings, fixed: Fixed = CHOOSE_ALL, *, quick: bool
-) -> tuple[str, ...]:
-    """The features of all candidates for recordings."""
-    usual = candidates(
-        {},
-        fixed,
-        joints=recordings.mostly_have("joints"),
-        shear=recordings.mostly_have("shear"),
-        drawn=kinds_of(recordings.recordings) is not None,
-        quick=quick,
-    )
-    return features_of(usual)
-
-
-def trials_of(
-    recordings: Recordings,
-    windows: tuple[float, ...],
-    options: FitOptions,
-) -> Loaded:
-    """The trials of recordings, up to the last of some windows, by thresholds that are
-    given, saved, proposed or chosen."""
-    features = features_tried(recordings, options, quick=options.quick)
-    measurement = Measurement(features, windows[-1], arm=options.arm, dead=options.dead)
-
-    def by(
-        threshold: int | None,
-        onset: int | None,
-        release_s: float | None = options.release,
-    ) -> DataSet:
-        return load_trials(
-            recordings,
-            replace(measurement, threshold=threshold, onset=onset, release_s=release_s),
-            partial=True,
-            progress=options.progress,
-            jobs=options.processes,
-        )
-
-    def accuracy(trials: DataSet) -> float:
-        hasty = replace(options, quick=True, progress=False)
-        y = labels_of_tasks(trials, options.tasks)
-        choosing = hasty.choosing(trials, y, drawn=are_drawn(trials))
-        return max(map(choosing.accuracy, {windows[0], windows[-1]}))
-
-    notes: list[str] = []
-    if options.threshold is not None or options.onset is not None:
-        dataset = by(options.threshold, options.onset)
-    else:
-        dataset, notes = _by_noise(recordings, by)
-        if not any("simulation" in r.meta for r in recordings.recordings):
-            dataset, lower = thresholds.chosen(dataset, by, accuracy)
-            notes += lower
-    if options.release is None:
-        layout = dataset.layout
-        longer = partial(by, layout.threshold_counts, layout.onset)
-        dataset, across = pieces.joined(dataset, longer, accuracy)
-        notes += across
-    return Loaded(dataset, windows, notes)
-
-
-def _by_noise(
-    recordings: Recordings,
-    by: Callable[[int | None, int | None], DataSet],
-) -> tuple[DataSet, list[str]]:
-    """The trials by the thresholds that the skin was saved with, or else by those that
-    its noise suggests, and the warning of these."""
-    reason = "the skin was saved without thresholds"
-    if "threshold_counts" in recordings.of_owner[0].meta.get("skin", {}):
-        try:
-            return by(None, None), []
-        except Untouched:
-            reason = "no recording has a contact at its own thresholds"
-    proposal = thresholds.proposed(recordings.of_owner)
-    warning = (
-        f"warning: {reason}; a threshold of {proposal.threshold} and an onset of "
-        f"{proposal.onset} counts come from {proposal.source}"
-    )
-    return by(proposal.threshold, proposal.onset), [warning]
+def described() -> str:
+    """A line of a docstring for each option."""
+    lines = (f"    {of.name}: {of.metadata['help']}." for of in fields(FitOptions))
+    return "\n".join(lines)

@@ -1,4 +1,4 @@
-"""What is left out to choose a task's settings and to measure them: single trials, or
+"""What is held out to choose a task's settings and to measure them: single trials, or
 entire groups of them."""
 
 from collections.abc import Iterable, Mapping, Sequence
@@ -13,19 +13,16 @@ from train.choose.candidates import Candidate, costs, places_of
 from train.choose.evaluate import (
     VARIANCE,
     AnswerTable,
-    Promise,
+    NestedAccuracy,
     Result,
     RuleOf,
     fold_numbers,
 )
 from train.choose.rule import Rule
-from train.data.folds import SEED
 from train.data.groups import TRIAL, Groups
 from train.data.labels import NO_CONTACT
 from train.data.vectors import Strings
 from train.model.pipeline import Choice
-
-HALVINGS = 20
 
 
 def rule_among(
@@ -37,9 +34,7 @@ def rule_among(
     of about the best, or the best where trials are few.
 
     Among few trials a standard error is wide, and the cheapest within it often less
-    accurate: by 0 to 4 points on cuts of 54 trials of iCub, SDH-2 and simulated touches.
-    Their answers are graded then, which chooses better by another point; on cuts of 120
-    trials both together by 1.3 points.
+    accurate. Their answers are graded then (docs/measured.md).
 
     Args:
         choices: of the candidates.
@@ -51,16 +46,16 @@ def rule_among(
 
 @dataclass(frozen=True)
 class Protocol:
-    """The choice by answers to trials, or to entire groups of them, that are left out.
+    """The choice by answers to trials, or to entire groups of them, that are held out.
 
-    Tasks whose groups are left out share their settings: those with the best mean, over
-    these tasks, of the accuracies with trials and with groups left out. No price counts
+    Tasks whose groups are held out share their settings: those with the best mean, over
+    these tasks, of the accuracies with trials and with groups held out. No price counts
     there, as a few groups hold most errors: the standard error among trials says little.
 
     Attributes:
-        table: the answers to what is left out.
+        table: the answers to what is held out.
         rules: of the choice of a task.
-        groups: that are left out; None for single trials.
+        groups: that are held out; None for single trials.
         beside: the answers to what the other protocol leaves out; None of tasks without
             groups.
         sharing: the tasks that share their settings.
@@ -74,7 +69,7 @@ class Protocol:
 
     @property
     def name(self) -> str:
-        """What is left out."""
+        """What is held out."""
         return TRIAL if self.groups is None else self.groups.name
 
     @property
@@ -121,35 +116,18 @@ class Protocol:
         return self.table.choices[task][place]
 
     def places(self, task: str, rule: Rule) -> list[int]:
-        """[fold] the candidate chosen by a rule without what is left out."""
+        """[fold] the candidate chosen by a rule without what is held out."""
         numbers = fold_numbers(self.folds)
         return [rule.choose(self.answers_without(task, fold)) for fold in numbers]
 
     def by_fold(self, task: str) -> list[Choice]:
-        """[fold] a task's settings chosen without what is left out."""
+        """[fold] a task's settings chosen without what is held out."""
         places = self.places(task, self.rule(task))
         return [self.table.choices[task][place] for place in places]
 
     def accuracy(self, task: str) -> Result:
         """The nested accuracy of the choice."""
         return self.table.answered(task, self.places(task, self.rule(task)))
-
-    def agreed(self, task: str) -> int:
-        """In how many of `HALVINGS` divisions of the folds into two halves these choose
-        the same features and projection."""
-        answers = self.answers(task)
-        rule = self.rule(task)
-        numbers = fold_numbers(self.folds)
-        draw = np.random.default_rng(SEED)
-        agreed = 0
-        for _ in range(HALVINGS):
-            half = np.isin(self.folds, draw.permutation(numbers)[::2])
-            kinds = set()
-            for part in (half, ~half):
-                choice = self.table.choices[task][rule.choose(answers[:, part])]
-                kinds.add((choice.features, choice.projection))
-            agreed += len(kinds) == 1
-        return agreed
 
     def of_candidate(
         self, task: str, candidate: Candidate
@@ -168,11 +146,11 @@ class Protocol:
 
 @dataclass(frozen=True)
 class Protocols:
-    """The choices by what is left out.
+    """The choices by what is held out.
 
     Attributes:
         trials: of tasks without groups, by single trials.
-        groups: of the tasks whose groups are left out; None where there are none.
+        groups: of the tasks whose groups are held out; None where there are none.
         shared: the choice of these tasks without folds of single trials.
     """
 
@@ -198,17 +176,19 @@ def _mean(answers: Iterable[NDArray[Any]]) -> Floats:
     return np.asarray(np.mean(list(answers), axis=0))
 
 
-def promised(result: Result, untouched: Sequence[str] = (), groups: int = 0) -> Promise:
-    """A result as a promise of the accuracy on other trials, or on other groups.
+def nested_accuracy(
+    result: Result, untouched: Sequence[str] = (), groups: int = 0
+) -> NestedAccuracy:
+    """A result with the interval of the accuracy on other trials, or on other groups.
 
     Args:
         result: on the trials with a contact.
         untouched: labels of the recordings without one. Missed touches count as wrong,
             and recordings of no touch as right.
-        groups: number of the groups left out; 0 for single trials.
+        groups: number of the groups held out; 0 for single trials.
     """
     right = result.right + untouched.count(NO_CONTACT)
     total = result.total + len(untouched)
     variance = max(VARIANCE, total / groups if groups else 0.0)
     counted = {"right": right, "total": total, "variance": variance}
-    return Promise(**{**vars(result), **counted})
+    return NestedAccuracy(**{**vars(result), **counted})

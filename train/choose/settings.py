@@ -8,11 +8,11 @@ import numpy as np
 
 from edge.arrays import Integers
 from train.choose.candidates import Candidate
-from train.choose.evaluate import Promise
+from train.choose.evaluate import NestedAccuracy
 from train.data.folds import finest, stratified_folds
 from train.data.vectors import Labels
 from train.model.pipeline import Choice, Choices
-from train.model.stopping import Early
+from train.model.stopping import EarlySettings
 
 
 @dataclass(frozen=True)
@@ -21,29 +21,27 @@ class Chosen:
 
     Attributes:
         choice: the features, scaling, projection and numbers.
-        accuracy: nested accuracy of the entire choice, with entire groups left out
-            where `left_out` is not `trial`. Tasks that agree are decided together, as
+        accuracy: nested accuracy of the entire choice, with entire groups held out
+            where `held_out` is not `trial`. Tasks that agree are decided together, as
             the model does. Its interval is that of the exported model on other trials.
-        by_trial: the same with single trials left out.
-        left_out: `trial`, or the label whose groups were left out.
+        by_trial: the same with single trials held out.
+        held_out: `trial`, or the label whose groups were held out.
         candidates: nested accuracy of each candidate's own choice of numbers, by the
             task alone; None where it was dropped, or is none for the task.
         picks: the best settings of each candidate, likewise.
         folds: (n,) of `accuracy`.
-        agreed: see `Protocol.agreed`.
         by_fold: [fold]{task: the choice without the fold's trials}, whose decisions
             `accuracy` counts: those of the task and of the tasks that are decided
             together with it.
     """
 
     choice: Choice
-    accuracy: Promise
-    by_trial: Promise
-    left_out: str
-    candidates: tuple[Promise | None, ...] = ()
+    accuracy: NestedAccuracy
+    by_trial: NestedAccuracy
+    held_out: str
+    candidates: tuple[NestedAccuracy | None, ...] = ()
     picks: tuple[Choice | None, ...] = ()
     folds: Integers = field(default_factory=lambda: np.zeros(0, np.int64), repr=False)
-    agreed: int = 0
     by_fold: tuple[dict[str, Choice], ...] = ()
 
 
@@ -57,7 +55,6 @@ class Settings:
         without: [fold]{task: the choice made without the fold's trials}.
         candidates: that they were chosen among.
         window_s: of the full decision.
-        notes: sentences that a user should read.
         early: settings of earlier decision points; None where those of the full window
             serve for all.
     """
@@ -67,8 +64,7 @@ class Settings:
     without: list[dict[str, Choice]]
     candidates: Sequence[Candidate]
     window_s: float
-    notes: list[str]
-    early: Early | None = None
+    early: EarlySettings | None = None
 
     def with_others(self, chosen_by: Integers, y: Labels) -> Self:
         """The settings with folds for all trials, of which some had no part in the

@@ -1,8 +1,7 @@
 """Draw recordings.
 
-Draws a recording: frames over time with the contact region, and the three features;
-with --model, its curves over those of the nearest training trials. Draws several
-recordings side by side, with the decisions of --model.
+Draws a recording: frames over time with the contact region, and the three features.
+Draws several recordings, or the decisions of --model, side by side.
 """
 
 import argparse
@@ -20,10 +19,8 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         nargs="+",
         help="an .npz recording, or several to compare",
     )
-    text = "draw the reasons for its decision on a recording, its decisions on several"
+    text = "whose decisions are drawn"
     add_file(parser, "model", text)
-    text = "with --model, the folder of the training trials (default: that of the recording)"
-    option("--data", type=Path, metavar="DIR", help=text)
     option(
         "--out",
         metavar="PNG",
@@ -40,34 +37,21 @@ def run(arguments: argparse.Namespace) -> int:
     """Draw, and say where."""
     from edge.decide.model import Model
     from edge.record.recording import load
+    from train.draw import comparison
+    from train.draw.recording import draw
 
     models, recordings = apart(arguments.recording, arguments.model)
     if len(models) > 1 or not recordings:
         raise InputError("give recordings to draw, and at most one model.onnx")
     first = recordings[0]
     out = Path(arguments.out or Path(first).with_suffix(".png"))
-    several = len(recordings) > 1
-    if arguments.dark and not several:
-        raise InputError("--dark is for several recordings")
-    model = Model(models[0]) if models else None
-    if several:
-        from train.draw import comparison
-
+    if models or len(recordings) > 1:
         touches = [(path, load(path)) for path in recordings]
+        model = Model(models[0]) if models else None
         comparison.draw(touches, out, model=model, dark=arguments.dark)
-    elif model is not None:
-        from train.draw import explanation
-
-        explanation.draw(
-            load(first),
-            out,
-            model,
-            arguments.data or Path(first).parent,
-            first,
-        )
+    elif arguments.dark:
+        raise InputError("--dark is for several recordings")
     else:
-        from train.draw.recording import draw
-
         draw(load(first), out, where=first)
     print(out)
     return 0

@@ -21,7 +21,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     option = parser.add_argument
     option("scene", help="a TOML file like train/scenes/cody18.toml")
     option("--out", metavar="DIR", help="folder for the recordings")
-    text = "print the effects that run, the reason for each, and its cost"
+    text = "effects that run, with the reason for each, and the error of the step"
     option("--explain", action="store_true", help=text)
     option("--seed", type=int, help="seed, instead of the scene's")
     text = "trials of each object in each condition, instead of the scene's"

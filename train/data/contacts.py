@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from edge.errors import InputError
+from edge.features.names import measures
 from edge.record.recording import Recording
 from edge.touch.contact import Contact, FeatureSeries
 from edge.touch.frame import Frame
@@ -35,7 +36,7 @@ LabelledFile = tuple[Path, dict[str, str]]
 """A recording's file, and {task: label}."""
 
 
-class Untouched(InputError):
+class NoContactFound(InputError):
     """No recording has a contact at the thresholds."""
 
 
@@ -114,7 +115,7 @@ def collect(
     """The trials of recordings whose contacts were followed.
 
     Raises:
-        Untouched: no recording has a contact.
+        NoContactFound: no recording has a contact.
     """
     trials: list[Trial] = []
     untouched = []
@@ -127,7 +128,7 @@ def collect(
         for trial_labels, touch in zip(labels, touches, strict=False):
             trials.append(Trial(path, recording, trial_labels, *touch))
     if not trials:
-        raise Untouched(
+        raise NoContactFound(
             f"no contact in any of {len(recordings)} recordings; lower the threshold "
             f"of {layout.threshold_counts} counts"
         )
@@ -142,12 +143,15 @@ def follow(
     recording: Recording,
     path: Path,
     layout: SkinLayout,
+    features: Sequence[str],
+    joints: int = 0,
     **tracked: Any,
 ) -> Followed:
     """The contacts of a recording, and the labels of those that are trials."""
     try:
         layout = for_device(layout, recording.layout)
-        tracker = ContactTracker(layout, **tracked)
+        measured = measures(layout, features, joints)
+        tracker = ContactTracker(layout, measures=measured, **tracked)
         tracker.outside = recording.meta.get("onset") is not None
         touches = contacts(recording, tracker)
         return touches, labels_of(recording, len(touches))

@@ -19,17 +19,16 @@ from numpy.typing import NDArray
 
 from edge.arrays import Floats
 from edge.errors import InputError
+from edge.features.kernels import KernelTable, kernel_channels
+from edge.features.names import Feature, feature, feature_types
+from edge.features.quantities import KERNELS
+from edge.features.vector import FEATURES, SAMPLES, WINDOW_S, feature_vector, widths
 from edge.files import read_bytes
 from edge.record.labels import read_table
 from edge.record.npz import LARGEST_BYTES
 from edge.record.recording import Recording, load
 from edge.record.saving import find
-from edge.touch import measures
 from edge.touch.arm import Chain
-from edge.touch.contact import feature_types
-from edge.touch.feature import KERNELS, Feature
-from edge.touch.features import FEATURES, SAMPLES, WINDOW_S, feature_vector, widths
-from edge.touch.kernels import KernelTable, kernel_channels
 from edge.touch.layout import SkinLayout
 from train.data.arms import arm_of, joint_angles
 from train.data.contacts import (
@@ -172,7 +171,7 @@ class DataSet:
         names: Sequence[str] | None = None,
     ) -> Floats:
         """(n, features * samples) feature vectors (see
-        `edge.touch.features.feature_vector`).
+        `edge.features.vector.feature_vector`).
 
         Args:
             window_s: seconds from onset.
@@ -243,7 +242,7 @@ class DataSet:
             names=measured_names,
             layout=replace(self.layout, axes=axes(types)),
             chain=self.chain if any(map(moves, types)) else None,
-            joints=self.joints if any(feature.of_joints for feature in types) else 0,
+            joints=self.joints if any(of.quantity.of_joints for of in types) else 0,
             kernels={
                 name: table
                 for name, table in self.kernels.items()
@@ -254,7 +253,7 @@ class DataSet:
     @property
     def units(self) -> dict[str, str]:
         """The unit of each feature."""
-        return {name: unit(measures.feature(name), self.layout) for name in self.names}
+        return {name: unit(feature(name), self.layout) for name in self.names}
 
 
 def read(
@@ -305,7 +304,7 @@ class Measurement:
     """The measures that are taken of each contact.
 
     Attributes:
-        features: names of the features (see `edge.touch.measures`).
+        features: names of the features (see `edge.features.names`).
         horizon_s: seconds from onset that are kept of each contact.
         threshold: counts above which a taxel is in contact; those of the first
             recording that is not simulated where None. All share it, as the board does
@@ -340,7 +339,7 @@ class Measurement:
     @property
     def of_joints(self) -> bool:
         """Whether a feature is made of joint angles."""
-        return any(feature.of_joints for feature in self.types)
+        return any(of.quantity.of_joints for of in self.types)
 
     def layout(self, data: Recordings) -> SkinLayout:
         """The skin of recordings, as it is measured.

@@ -36,7 +36,7 @@ roots. Forces spread over decades; their square roots lie evenly, as those of co
 | `slant` | taxel^2 | and times row times column |
 
 `taxels`: every taxel in its place, or cells of several where the skin is large
-(`edge.touch.cells.Cells`). `sqrt_taxels`: the same of their square roots.
+(`edge.features.cells.Cells`). `sqrt_taxels`: the same of their square roots.
 
 | feature, of each cell | unit | from |
 |---|---|---|
@@ -45,9 +45,9 @@ roots. Forces spread over decades; their square roots lie evenly, as those of co
 | `taxel_force_roughness` | newton (count) | its mean change from sample to sample |
 
 `kernels`: the share of the window in which kernels of nine samples, applied to sums of
-the skin's cells, lie above values that training gave (`edge.touch.kernels`).
+the skin's cells, lie above values that training gave (`edge.features.kernels`).
 `zone_kernels`: the same of the eight whole numbers of each zone
-(`edge.touch.zones.ZONE_WIDTH`), which goes with `moments`.
+(`edge.features.zones.ZONE_WIDTH`), which goes with `moments`.
 
 | feature | unit | from |
 |---|---|---|
@@ -85,20 +85,9 @@ of the normal one. It nears the coefficient of friction before a contact slides.
 
 from collections.abc import Sequence
 
-from edge.touch.feature import KERNELS, PAPER, Feature
+from edge.features.names import PAPER, Feature
 from edge.touch.layout import SkinLayout
-from edge.touch.measures import OF_SHEAR, QUANTITIES
 
-FORCES = (
-    "max_force",
-    "force",
-    "taxel_force",
-    "shear_along",
-    "shear_around",
-    "shear_size",
-    "taxel_shear",
-)
-"""Quantities in the unit of a force."""
 _TAXELS = (
     "taxel_force@10",
     "taxel_force_mean",
@@ -123,8 +112,18 @@ SETS: dict[str, tuple[str, ...]] = {
     "moments": tuple(
         f"sqrt_{zone}_{quantity}@20"
         for zone in ("left", "right", "skin")
-        for quantity in QUANTITIES
-        if quantity != "pressure"
+        for quantity in (
+            "max_force",
+            "force",
+            "area",
+            "along",
+            "around",
+            "spread_along",
+            "spread_around",
+            "slant",
+            "length",
+            "width",
+        )
     ),
     "taxels": _TAXELS,
     "sqrt_taxels": tuple(f"sqrt_{name}" for name in _TAXELS),
@@ -143,7 +142,7 @@ SETS: dict[str, tuple[str, ...]] = {
     ),
     "taxel_shear": ("sqrt_taxel_shear@10",),
 }
-"""{set: names of its features, see `edge.touch.measures`}."""
+"""{set: names of its features, see `edge.features.names`}."""
 
 
 def expand(names: Sequence[str]) -> tuple[str, ...]:
@@ -155,28 +154,18 @@ def expand(names: Sequence[str]) -> tuple[str, ...]:
 def moves(feature: Feature) -> bool:
     """Whether a feature is measured in the world's frame where joint angles are
     known."""
-    return feature.quantity in ("motion", "force_motion", "stiffness")
+    return bool(feature.quantity.motion)
 
 
 def axes(types: Sequence[Feature]) -> int | None:
     """3 where a feature needs shear, else None, as `SkinLayout.axes` says it."""
-    return 3 if any(feature.quantity in OF_SHEAR for feature in types) else None
+    return 3 if any(feature.quantity.shear for feature in types) else None
 
 
 def unit(feature: Feature, layout: SkinLayout) -> str:
     """The unit of a feature's values on a skin."""
-    text = {
-        **dict.fromkeys(FORCES, layout.force_unit),
-        "pressure": f"{layout.force_unit}/taxel",
-        "motion": layout.length_unit,
-        "force_motion": layout.length_unit,
-        "stiffness": f"{layout.force_unit}/{layout.length_unit}",
-        "slant": "taxel^2",
-        "shear_ratio": "1",
-        "joint_change": "radian",
-        "joint_angle": "radian",
-        **dict.fromkeys(KERNELS, "1"),
-    }.get(feature.quantity, "taxel")
+    units = {"force": layout.force_unit, "length": layout.length_unit}
+    text = feature.quantity.unit.format(**units)
     for transform in feature.transforms:
         text = "1" if transform == "relative" else f"{transform}({text})"
     return f"{text}/s" if feature.summary == "rate" else text

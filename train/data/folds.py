@@ -1,4 +1,4 @@
-"""Folds of trials, and of entire groups of them, that are left out together."""
+"""Folds of trials, and of entire groups of them, that are held out together."""
 
 import numpy as np
 

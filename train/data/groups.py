@@ -1,4 +1,4 @@
-"""The trials that are left out together to choose settings: folds of trials, and entire
+"""The trials that are held out together to choose settings: folds of trials, and entire
 groups of them."""
 
 from __future__ import annotations
@@ -16,10 +16,10 @@ from train.data.folds import FOLDS, SEED, finest, group_folds, stratified_folds
 from train.data.vectors import Labels, Strings
 
 FEWEST_GROUPS = 3
-"""Objects that a class needs before entire objects can be left out."""
+"""Objects that a class needs before entire objects can be held out."""
 LEAVE_OUT = "object"
 KIND = "kind"
-"""Left out in place of an object where `kinds_of` names the kinds."""
+"""Held out in place of an object where `kinds_of` names the kinds."""
 TRIAL = "trial"
 QUICK_FOLDS = 5
 GROUP_FOLDS = 20
@@ -35,7 +35,7 @@ the division."""
 
 
 def kinds_of(recordings: Sequence[Recording]) -> Strings | None:
-    """(n,) kind of thing in each, where a scene drew several objects of some kind.
+    """(n,) kind of object in each, where a scene drew several objects of some kind.
 
     A `[[family]]` of a scene names its objects by the kind and a number. Any other
     object is of a kind of its own. None without such a scene.
@@ -53,12 +53,12 @@ def kinds_of(recordings: Sequence[Recording]) -> Strings | None:
 
 
 def are_drawn(dataset: DataSet) -> bool:
-    """Whether the trials are of things that a scene drew from kinds."""
+    """Whether the trials are of objects that a scene drew from kinds."""
     return kinds_of([trial.recording for trial in dataset.trials]) is not None
 
 
 def groupable(labels: Strings, groups: Strings) -> bool:
-    """Whether every class has enough groups that entire groups can be left out."""
+    """Whether every class has enough groups that entire groups can be held out."""
     classes = set(labels.tolist())
     return len(classes) > 1 and all(
         len(set(groups[labels == label].tolist())) >= FEWEST_GROUPS for label in classes
@@ -72,12 +72,12 @@ def fold_count(trials: int, quick: bool = False) -> int:
 
 @dataclass(frozen=True)
 class Groups:
-    """Trials that are left out together.
+    """Trials that are held out together.
 
     Attributes:
         name: of the label that tells the groups.
         members: (n,) the group of each trial.
-        tasks: those for which entire groups are left out.
+        tasks: those for which entire groups are held out.
         folds: (n,) of entire groups.
     """
 
@@ -97,7 +97,7 @@ def groups_of(
     leave_out: str,
     quick: bool,
 ) -> Groups | None:
-    """The kinds of things, or else the groups of a label, where some task has enough of
+    """The kinds of objects, or else the groups of a label, where some task has enough of
     them."""
     for name, members in _memberships(dataset, leave_out).items():
         tasks = [t for t in y if t != leave_out and groupable(y[t], members)]
@@ -111,7 +111,7 @@ def groups_of(
 
 
 def _memberships(dataset: DataSet, leave_out: str) -> dict[str, Strings]:
-    """{name: (n,) the group of each trial}, those that are left out first if they can
+    """{name: (n,) the group of each trial}, those that are held out first if they can
     be first."""
     if leave_out == TRIAL:
         return {}
@@ -124,7 +124,7 @@ def _memberships(dataset: DataSet, leave_out: str) -> dict[str, Strings]:
 
 @dataclass(frozen=True)
 class Divisions:
-    """The trials that are left out together, to choose and to measure.
+    """The trials that are held out together, to choose and to measure.
 
     Attributes:
         folds: (n,) of single trials.
@@ -138,7 +138,7 @@ class Divisions:
 
     @property
     def fewest_left(self) -> int:
-        """The smallest number of trials that remain where a fold is left out."""
+        """The smallest number of trials that remain where a fold is held out."""
         divisions = [self.folds, *self.further]
         if self.groups is not None:
             divisions.append(self.groups.folds)
@@ -158,9 +158,9 @@ class Divisions:
         Args:
             dataset: the trials.
             y: {task: (n,) labels}.
-            leave_out: label whose groups are left out for a task, where each of its
+            leave_out: label whose groups are held out for a task, where each of its
                 classes has several of them; `TRIAL` for none. In place of an object its
-                entire kind is left out where `kinds_of` names the kinds: accuracy on
+                entire kind is held out where `kinds_of` names the kinds: accuracy on
                 other objects of the same kinds says nothing of how a simulator's model
                 does elsewhere.
             quick: fewer folds.

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from edge.arrays import Integers
-from edge.touch.kernels import (
+from edge.features.kernels import (
     BITS,
     KernelTable,
     convolution_of_bias,
@@ -27,7 +27,7 @@ def kernel_table(touches: Sequence[Integers], biases: int, alike: bool) -> Kerne
 
     Args:
         touches: (channels, samples) of each touch, see
-            `edge.touch.features.kernel_channels`.
+            `edge.features.vector.kernel_channels`.
         biases: how many there are.
         alike: the channels have one unit and share a shift.
     """

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from edge.arrays import Floats
-from edge.touch.joint_doubts import LIMIT_TOLERANCE
+from edge.decide.doubts import LIMIT_TOLERANCE
 from train.data.dataset import DataSet
 
 MOST_DEVIATIONS = 20.0

@@ -1,18 +1,17 @@
 """Thresholds: those that a skin's own noise suggests, and lower ones where touches are
 missed."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import filterfalse
 
 import numpy as np
 
 from edge.record.recording import Recording
+from edge.record.thresholds import MARGIN, QUIET_S, above, noise
 from edge.touch.layout import for_device
-from edge.touch.thresholds import MARGIN, QUIET_S, above, noise
 from edge.touch.track import DEBOUNCE, ContactTracker
 from train.data.contacts import contacts, with_thresholds
-from train.data.dataset import DataSet
 from train.data.labels import NO_CONTACT
 
 MARGINS = (MARGIN, 1.0)
@@ -27,10 +26,6 @@ BEGUN_SHARE = 0.2
 """A recording begins in contact if a count of its first frames is above three times the
 median taxel, and above a fifth of its highest count."""
 QUIETEST = 0.2
-LOWER = (0.5, 0.25, 0.0)
-"""Parts of the recorded thresholds that are tried where touches are missed."""
-FEWEST_GAINED = 1.5
-"""Recordings that must be decided right more often."""
 
 
 @dataclass(frozen=True)
@@ -50,7 +45,7 @@ class Proposal:
 def proposed(recordings: Sequence[Recording]) -> Proposal:
     """Thresholds from the noise before contact.
 
-    The noise is the 90th percentile of `edge.touch.thresholds.noise` over the
+    The noise is the 90th percentile of `edge.record.thresholds.noise` over the
     recordings that do not begin in contact. The threshold is twice the noise, or as
     high as the noise where that misses more of the recordings labelled with a touch.
     Where no recording has an untouched part, the threshold is the level of the quietest
@@ -139,57 +134,3 @@ def count_contacts(
         tracker = ContactTracker(for_device(layout, recording.layout), horizon_s=0.1)
         counts.append(len(contacts(recording, tracker)))
     return len(np.flatnonzero(counts)), sum(counts)
-
-
-def chosen(
-    dataset: DataSet,
-    load: Callable[[int, int], DataSet],
-    accuracy: Callable[[DataSet], float],
-) -> tuple[DataSet, list[str]]:
-    """The data set at the thresholds whose decisions are most accurate, and sentences
-    that say so.
-
-    Lower ones are tried where a recording that is labelled with a touch shows none.
-    They are taken where they gain more than a standard error and a single recording, as
-    they find a contact in any noise. Of equally accurate ones the highest are taken.
-
-    Args:
-        dataset: at the recorded thresholds.
-        load: the data set at a threshold and an onset.
-        accuracy: of decisions on a data set, where missed touches count as wrong.
-    """
-    unfelt = sum(NO_CONTACT not in labels.values() for _, labels in dataset.untouched)
-    present = dataset.layout.threshold_counts, dataset.layout.onset
-    levels = dict.fromkeys(
-        (round(part * present[0]), round(part * present[1])) for part in LOWER
-    )
-    if not unfelt or present[1] == 0:
-        return dataset, []
-    datasets = [dataset, *(load(*level) for level in levels if level != present)]
-    best, shares = most_accurate(datasets, accuracy)
-    if best == 0:
-        return dataset, []
-    layout = datasets[best].layout
-    return datasets[best], [
-        f"the threshold is {layout.threshold_counts} and the onset {layout.onset} "
-        "counts: at "
-        f"{present[0]} and {present[1]} counts, {unfelt} recordings show no contact; in "
-        "cross-validation "
-        f"{shares[best]:.1%} against {shares[0]:.1%} (--threshold and --onset set them)"
-    ]
-
-
-def most_accurate(
-    datasets: Sequence[DataSet], accuracy: Callable[[DataSet], float]
-) -> tuple[int, list[float]]:
-    """The place of the data set whose decisions are most accurate, and the accuracies.
-
-    It is that of the first one, 0, where the others gain less than a standard error or
-    a single recording.
-    """
-    shares = list(map(accuracy, datasets))
-    best = int(np.argmax(shares))
-    n = len(datasets[0].trials) + len(datasets[0].untouched)
-    error = np.sqrt(n * shares[0] * (1.0 - shares[0]))
-    gains = n * (shares[best] - shares[0]) > max(error, FEWEST_GAINED)
-    return best if gains else 0, shares

@@ -9,10 +9,9 @@ from typing import Any
 
 import numpy as np
 
+from edge.decide.doubts import frame_doubts, still_times
 from edge.errors import InputError
 from edge.touch.contact import FeatureSeries
-from edge.touch.doubts import frame_doubts
-from edge.touch.joint_doubts import still_times
 from train.data.dataset import DataSet
 
 OFTEN = 0.2
@@ -20,11 +19,9 @@ OFTEN = 0.2
 SELDOM = 0.01
 """Share of the trials that may lie outside of a usual range, on one side."""
 SLOWER = 0.97
-"""Part of the least speed that is no doubt, as clocks and encoders err. At 0.9 of the
-speed, 4 % of the sure answers were wrong, as things had not moved yet."""
+"""Part of the least speed that is no doubt, as clocks and encoders err."""
 FASTER = 1.15
-"""Part of the greatest speed that is no doubt. At 1.1 times the speed no more answers
-were wrong, at 1.2 times 7 % of the sure objects."""
+"""Part of the greatest speed that is no doubt."""
 RESTS = 0.01
 """Radians a second that the encoders of an arm at rest may show."""
 

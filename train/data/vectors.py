@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from edge.arrays import Floats, Integers
 from edge.errors import InputError
-from edge.touch.features import FEATURES
+from edge.features.vector import FEATURES
 
 Strings = NDArray[np.str_]
 

@@ -17,9 +17,9 @@ from edge.decide.classifier import Classifier
 from edge.decide.events import Decided
 from edge.decide.model import Model
 from edge.errors import InputError, about
+from edge.features.vector import WINDOW_S
 from edge.record.recording import Recording
 from edge.touch.contact import FeatureSeries
-from edge.touch.features import WINDOW_S
 from edge.touch.layout import SkinLayout
 from edge.touch.track import ContactTracker
 from edge.writing import write_whole
@@ -78,7 +78,7 @@ def _draw(
     model: Model | None,
 ) -> None:
     horizon = WINDOW_S if model is None else model.info.window_s
-    touches = [_Touch.of(*recording, horizon) for recording in recordings]
+    touches = [_Column.of(*recording, horizon) for recording in recordings]
     layout = touches[0].recording.layout
     for touch in touches:
         _require_units(touch, layout)
@@ -113,9 +113,8 @@ def _draw(
 def contact_of(
     name: str,
     recording: Recording,
-    number: int = 1,
 ) -> tuple[float, FeatureSeries]:
-    """Onset and series of a recording's first contact, or of a later one.
+    """Onset and series of a recording's first contact.
 
     Raises:
         InputError: there is no such contact; the message begins with `name`.
@@ -124,14 +123,13 @@ def contact_of(
     if chain is not None:
         recording = recording.for_joints(chain.names, name)
     touches = contacts(recording, ContactTracker(recording.layout, chain=chain))
-    if not 0 < number <= len(touches):
-        which = "" if number == 1 else f" {number}"
-        raise InputError(f"{name}: holds no contact{which}")
-    return touches[number - 1]
+    if not touches:
+        raise InputError(f"{name}: holds no contact")
+    return touches[0]
 
 
 @dataclass(frozen=True)
-class _Touch:
+class _Column:
     """A recording, and its first contact.
 
     Attributes:
@@ -173,7 +171,7 @@ class _Touch:
         return "\n".join(filter(None, words)) or "touch"
 
 
-def _require_units(touch: _Touch, layout: SkinLayout) -> None:
+def _require_units(touch: _Column, layout: SkinLayout) -> None:
     """Refuse a touch in other units than those of a skin.
 
     Raises:
@@ -188,7 +186,7 @@ def _require_units(touch: _Touch, layout: SkinLayout) -> None:
             )
 
 
-def _decided(touch: _Touch, model: Model) -> Decided | None:
+def _decided(touch: _Column, model: Model) -> Decided | None:
     """The decision of the category, or of the first task where the model has none."""
     tasks = list(model.info.tasks)
     task = "category" if "category" in tasks else tasks[0]

@@ -8,13 +8,12 @@ import numpy as np
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
+from edge.features.vector import FEATURES, WINDOW_S
 from edge.record.recording import Recording
 from edge.touch.contact import FeatureSeries
-from edge.touch.features import FEATURES, WINDOW_S
-from edge.touch.first_contact import first_contact
 from edge.touch.layout import SkinLayout
 from edge.touch.region import largest_region
-from edge.touch.track import ContactTracker
+from edge.touch.track import ContactTracker, first_contact
 from edge.writing import write_whole
 from train.data.arms import arm_of
 

@@ -13,15 +13,15 @@ def products(y: Labels) -> dict[str, tuple[str, str]]:
     """{task: two other tasks whose labels together determine its own, and follow from
     it}.
 
-    Neither of the two determines the task alone, and neither names things: `object`, or
+    Neither of the two determines the task alone, and neither names objects: `object`, or
     the task with most labels. Of several pairs the one is taken whose labels the task's
     words are made of, as `rigid-fixed` is, or else the one with the fewest labels.
     """
     pairs: dict[str, tuple[str, str]] = {}
-    names_things = {LEAVE_OUT, finest(y)}
+    names_objects = {LEAVE_OUT, finest(y)}
     for task, labels in y.items():
         factors = []
-        for factor in sorted(y.keys() - {task} - names_things):
+        for factor in sorted(y.keys() - {task} - names_objects):
             follows = _determines(labels, y[factor])
             if follows and not _determines(y[factor], labels):
                 factors.append(factor)

@@ -27,11 +27,9 @@ held-out trials are as novel as what a robot may meet."""
 LEAST_DOUBT = 0.5
 """The odds fall at least by the root of the novelty, for the same reason."""
 WITHHELD = 0.5
-"""Part of the mean confidence that doubt about the thing takes from known things, and
-that is not given back. With all of it given back, curves rise so far that things that
-were never met are surely named too: 17 % of their touches with more than 0.9 instead of
-12 %. With none, known things have a calibration error of 0.07 instead of 0.05 (cody18, 14
-full exports without four objects)."""
+"""Part of the mean confidence that doubt about the object takes from known objects, and
+that is not given back. With all of it given back, objects that were never met are surely
+named; with none, known objects are called too doubtful (docs/measured.md)."""
 LEAST_SLOPE = 1e-3
 """Smallest slope a standard deviation: a larger margin never makes a label less
 likely."""
@@ -106,7 +104,7 @@ def board_logistic(x: Floats) -> Floats:
 
 @dataclass(frozen=True)
 class Evidence:
-    """What answers to left-out trials say of how sure a model may be; arrays of one
+    """What answers to held-out trials say of how sure a model may be; arrays of one
     shape.
 
     Attributes:
@@ -114,7 +112,7 @@ class Evidence:
         excess: of the contacts' novelty.
         right: whether the labels are right.
         honest: whether those are right whose settings were chosen without the trials.
-        known: probability that the thing is one of those in training, by which that of
+        known: probability that the object is one of those in training, by which that of
             the curve is multiplied.
         weights: how much each answer counts.
     """
@@ -188,8 +186,8 @@ def cross_fitted(
     tested."""
     confidences = np.zeros(right.shape)
     for fold in range(int(folds.max()) + 1):
-        left_out = folds == fold
-        outside = tested & ~left_out
+        held_out = folds == fold
+        outside = tested & ~held_out
         answered = right[:, outside]
         curve = Curve.of(
             margins[:, outside],
@@ -197,8 +195,8 @@ def cross_fitted(
             answered,
             np.ones(answered.shape),
         )
-        confidences[:, left_out] = curve.probabilities(
-            margins[:, left_out],
-            excess[:, left_out],
+        confidences[:, held_out] = curve.probabilities(
+            margins[:, held_out],
+            excess[:, held_out],
         )
     return confidences

@@ -71,7 +71,7 @@ def held_out(
 
     Args:
         vectors: (decision points, n, p).
-        folds: (n,) from 0, or -1 for trials that are never left out.
+        folds: (n,) from 0, or -1 for trials that are never held out.
         runs: [run][fold][decision point]{task: Choice}.
         jobs: processes.
         heading: of a progress bar on stderr; empty for none.

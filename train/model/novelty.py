@@ -36,7 +36,7 @@ from scipy.linalg import eigh
 from scipy.spatial.distance import cdist
 
 from edge.arrays import Booleans, Floats, Integers
-from edge.touch.measures import feature
+from edge.features.names import feature
 from train.data.vectors import Strings, Vectors, blocks
 from train.threads import in_processes, single_thread
 
@@ -209,12 +209,12 @@ def least_deviations(vectors: Vectors, drawn: bool) -> Floats:
     for name in vectors.features:
         of_feature = feature(name)
         columns = vectors.columns_of([name])
-        if drawn and of_feature.of_joints:
+        if drawn and of_feature.quantity.of_joints:
             deviation = vectors.X[-1][:, columns].std(axis=0)
             ends = np.arange(1, len(columns) + 1) % max(of_feature.samples, 1) == 0
             moves = ends & (deviation >= MOVED_SHARE * deviation.max())
             least[columns] = np.where(moves, 0.0, np.inf)
-        elif of_feature.quantity == "joint_angle":
+        elif of_feature.quantity.name == "joint_angle":
             least[columns] = REMOUNT_RAD
     return least
 

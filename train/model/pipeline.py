@@ -19,7 +19,7 @@ from scipy.special import expit
 from edge.arrays import Floats, Integers
 from edge.decide.agreement import agreed
 from edge.errors import InputError
-from edge.touch.features import FEATURES
+from edge.features.vector import FEATURES
 from train.data.vectors import Labels, Strings, Vectors, blocks
 from train.model.agreement import factors_of
 from train.model.projection import Projection
@@ -168,7 +168,7 @@ def fittable(choices: Choices, y: Labels) -> dict[str, Choice]:
     return possible
 
 
-class Decided(NamedTuple):
+class TaskAnswers(NamedTuple):
     """A task's decisions on some vectors.
 
     Attributes:
@@ -334,7 +334,7 @@ class ContactClassifier:
         self.products_ = factors_of({task: vectors.y[task] for task in self.choices})
         return self
 
-    def decide(self, X: Floats) -> dict[str, Decided]:
+    def decide(self, X: Floats) -> dict[str, TaskAnswers]:
         """{task: decisions} on vectors (m, p), as `edge.Model` makes them of the
         graph's votes."""
         labels = {}
@@ -352,7 +352,7 @@ class ContactClassifier:
             together, nearest_answers = agreed(task, factors, distances)
             labels |= together
             distances |= nearest_answers
-        return {task: Decided(labels[task], distances[task]) for task in labels}
+        return {task: TaskAnswers(labels[task], distances[task]) for task in labels}
 
 
 def sharing_a_space(choices: Choices, vectors: Vectors) -> list[dict[str, Choice]]:

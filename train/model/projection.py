@@ -19,7 +19,7 @@ from sklearn.utils.validation import check_is_fitted
 
 from edge.arrays import Booleans, Floats, Integers
 from edge.errors import InputError
-from edge.touch.features import FEATURES
+from edge.features.vector import FEATURES
 from train.model.scaling import centred_and_scaled, column_means
 
 FEATURE_BITS = 22

@@ -70,7 +70,7 @@ def stops(confidence: Floats, rule: StoppingRule, unusual: Booleans) -> Integers
 
 
 @dataclass(frozen=True)
-class Course:
+class TimeSeries:
     """The answers of a task at each decision point, and how sure they are.
 
     Attributes:
@@ -79,7 +79,7 @@ class Course:
             other task is its only part.
         wrong: (decision points, n) of each part.
         unusual: (decision points, n) whether the contact is unlike all trained ones.
-        withheld: (decision points, n) whether the task names nothing, as the thing is
+        withheld: (decision points, n) whether the task names nothing, as the object is
             unknown; None of a task that always answers.
     """
 
@@ -111,37 +111,41 @@ def candidates(points: int) -> tuple[StoppingRule, list[list[StoppingRule]]]:
 
 
 def tested(
-    rule: StoppingRule, course: Course, seconds: Floats, level: float, before: float
+    rule: StoppingRule,
+    time_series: TimeSeries,
+    seconds: Floats,
+    level: float,
+    before: float,
 ) -> StoppingRule:
     """A rule with the error that is certified for it, at least `before`, and its mean
     time."""
-    at, wrong = course.under(rule)
-    limit = upper_limit(int(wrong.sum()), course.unusual.shape[1], level)
+    at, wrong = time_series.under(rule)
+    limit = upper_limit(int(wrong.sum()), time_series.unusual.shape[1], level)
     mean_s = float(seconds[at].mean())
     return StoppingRule(max(limit, before), mean_s, rule.confidence, rule.last)
 
 
-def at_full_window(course: Course, seconds: Floats) -> StoppingRule:
+def at_full_window(time_series: TimeSeries, seconds: Floats) -> StoppingRule:
     """The rule that always waits for the full window, tested first of all."""
     full, _ = candidates(len(seconds))
-    return tested(full, course, seconds, FULL_LEVEL, 0.0)
+    return tested(full, time_series, seconds, FULL_LEVEL, 0.0)
 
 
-def certify(course: Course, seconds: Floats) -> list[StoppingRule]:
+def certify(time_series: TimeSeries, seconds: Floats) -> list[StoppingRule]:
     """The rules that no other rule beats in both certified error and mean time, the
     safest first.
 
     Args:
-        course: of the task, on the calibration trials.
+        time_series: of the task, on the calibration trials.
         seconds: (points,) windows.
     """
     _, families = candidates(len(seconds))
-    passed = [at_full_window(course, seconds)]
+    passed = [at_full_window(time_series, seconds)]
     for family in families:
         before = passed[0].error
         for rule in family:
             level = FULL_LEVEL / len(families)
-            passed.append(tested(rule, course, seconds, level, before))
+            passed.append(tested(rule, time_series, seconds, level, before))
             before = passed[-1].error
     # Among equal rules the fixed window comes first, as it needs no confidence.
     passed.sort(key=lambda rule: (rule.error, rule.mean_s, not is_fixed(rule)))
@@ -156,7 +160,7 @@ def agreeing(
     product: str,
     factors: Collection[str],
     rules: Mapping[str, Sequence[StoppingRule]],
-    courses: Mapping[str, Course],
+    series: Mapping[str, TimeSeries],
     seconds: Floats,
 ) -> dict[str, list[StoppingRule]]:
     """{task: its rules} of a product and of its factors, which follow the product's
@@ -171,17 +175,17 @@ def agreeing(
         product: a task.
         factors: its factors.
         rules: {task: its certified rules}.
-        courses: {task: its course}.
+        series: {task: its time series}.
         seconds: (points,) windows.
     """
     least = rules[product][0].error
     agreed = {}
     for factor in factors:
-        waiting = at_full_window(courses[factor], seconds)
+        waiting = at_full_window(series[factor], seconds)
         agreed[factor] = [waiting] if waiting.error < least else []
     of_product: list[StoppingRule] = []
     for rule in rules[product]:
-        followed = _followed(rule, agreed, courses, seconds)
+        followed = _followed(rule, agreed, series, seconds)
         # A factor that goes on by itself would make the product err more often.
         if len(followed) == len(factors):
             of_product.append(rule)
@@ -193,13 +197,13 @@ def agreeing(
 def _followed(
     rule: StoppingRule,
     rules: Mapping[str, Sequence[StoppingRule]],
-    courses: Mapping[str, Course],
+    series: Mapping[str, TimeSeries],
     seconds: Floats,
 ) -> dict[str, StoppingRule]:
     """{factor: a rule} of those that it makes no slower than their rules so far."""
     followed = {}
     for factor, before in rules.items():
-        at, _ = courses[factor].under(rule)
+        at, _ = series[factor].under(rule)
         mean_s = float(seconds[at].mean())
         if not before or mean_s <= before[-1].mean_s + 1e-9:
             followed[factor] = replace(rule, mean_s=mean_s)

@@ -7,8 +7,8 @@ from numpy.typing import NDArray
 
 from edge.arrays import Booleans, Floats, Integers
 from edge.errors import InputError
-from edge.touch.features import FEATURES
-from edge.touch.measures import feature
+from edge.features.names import feature
+from edge.features.vector import FEATURES
 from train.data.vectors import widths_of
 
 OF_PAPER = ("none", "I", "II", "III", "IV", "V")
@@ -95,7 +95,7 @@ def scale_of(
     if method in ("I", "II"):
         return _inverse(largest, powers)
     if method in ("IV", BY_COLUMN):
-        wide = np.array([feature(name).wide for name in features])
+        wide = np.array([feature(name).quantity.wide for name in features])
         small = np.ldexp(X, -np.repeat(powers, sizes))
         deviations = _deviations(small, sizes, wide)
         # A spread below the rounding of its own mean is no spread.

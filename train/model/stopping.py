@@ -2,7 +2,7 @@
 
 A model decides at several decision points, each with a window, a projection and
 training rows of its own. Those before the last may have settings of their own too
-(`Early`): early the arm tells what the skin tells later. Confidence, rules and novelty
+(`EarlySettings`): early the arm tells what the skin tells later. Confidence, rules and novelty
 limits are made from trials that the deciding model did not see: the trials are divided
 into folds, and each fold is decided by a model that was fitted, and whose settings were
 chosen, without it.
@@ -11,26 +11,22 @@ chosen, without it.
 lie than those of any other (`edge.decide.info.margin`). Logistic regression turns it
 into the probability that the label is right (Platt, Probabilistic outputs for support
 vector machines, 1999), at the full window by a curve of its own, before it by one of
-all points together. A curve of each early point errs more: its mean is that of few
-trials (cody18, 140 trials: category by up to 0.10 instead of 0.07, three seeds). A label's
-distance is that of its nearest twentieth (`train.model.pipeline.label_distances`). So
-it is the same for the folds' models, which have fewer trials, as for the exported one.
+all points together. A label's distance is that of its nearest twentieth
+(`train.model.pipeline.label_distances`). So it is the same for the folds' models, which
+have fewer trials, as for the exported one.
 
-Where entire groups, such as objects, are left out for a task, its curve of the full
+Where entire groups, such as objects, are held out for a task, its curve of the full
 window is made as if a share `SHARE` of the answers were to groups that the deciding
-model has not met. Their errors come by groups: of 18 objects, two are always wrong when
-never met, and sure. So a larger share makes both known and unseen things err more
-(category of cody18, three seeds with 36 choices of four objects left out each: known
-0.044 instead of 0.056 half and half, unseen 0.177 instead of 0.189, where one number
-for all unseen things, their accuracy, has 0.180).
+model has not met.
+Their errors come by groups: one that is wrong is wrong about nearly all of its trials.
 
 **Rules** are certified by `train.model.rules`. They compare the confidences of all
 decision points with one threshold, by the curve of all points together.
 
 A touch that is unusual at a decision point waits, for the full window if it stays so:
-rules are tested with this wait. An error is a wrong label. The task that names things,
+rules are tested with this wait. An error is a wrong label. The task that names objects,
 which has most labels but for kinds such as category, names none that is unknown. So an
-`unknown` for a trained thing is an error of it too.
+`unknown` for a trained object is an error of it too.
 """
 
 from __future__ import annotations
@@ -44,7 +40,7 @@ from edge.arrays import Booleans, Floats, Integers
 from edge.decide.info import Novelty, Stopping, StoppingRule
 from edge.elementary import log
 from edge.errors import InputError
-from edge.touch.features import FEATURES
+from edge.features.vector import FEATURES
 from train.data.folds import finest, stratified_folds
 from train.data.vectors import Strings, Vectors
 from train.model.curves import Curve, Evidence, cross_fitted
@@ -59,8 +55,8 @@ from train.model.held_out import (
 from train.model.never_met import (
     SHARE,
     known_of,
+    object_folds,
     remoteness_of,
-    thing_folds,
     worth_of,
 )
 from train.model.novelty import (
@@ -74,7 +70,7 @@ from train.model.novelty import (
     limits_of,
 )
 from train.model.pipeline import Choices
-from train.model.rules import RISK, Course, agreeing, candidates, certify
+from train.model.rules import RISK, TimeSeries, agreeing, candidates, certify
 from train.threads import single_thread
 
 FEWEST = 20
@@ -82,7 +78,7 @@ FEWEST = 20
 
 
 @dataclass(frozen=True)
-class Early:
+class EarlySettings:
     """Settings of the decision points before the full window.
 
     Attributes:
@@ -130,7 +126,7 @@ class SequentialClassifier:
         jobs: processes.
         widths: columns of each feature type; equal where None.
         early: settings of early decision points; those of the full window where None.
-        drawn: whether a scene drew the trained things, so that the model is for other
+        drawn: whether a scene drew the trained objects, so that the model is for other
             arms than the scene's.
         heading: of progress bars on stderr; empty for none.
 
@@ -150,7 +146,7 @@ class SequentialClassifier:
     features: Sequence[str] = FEATURES
     jobs: int = 1
     widths: Sequence[int] | None = None
-    early: Early | None = None
+    early: EarlySettings | None = None
     drawn: bool = False
     heading: str = ""
 
@@ -169,7 +165,7 @@ class SequentialClassifier:
             y: {task: (n,) labels}; empty where a trial has none.
             folds: (n,) from 0, or -1 for trials that calibrate nothing.
             fold_choices: [fold]{task: Choice}, chosen without the fold's trials.
-            grouped: the tasks for which entire groups are left out.
+            grouped: the tasks for which entire groups are held out.
 
         Raises:
             InputError: there are too few trials, or X is not finite.
@@ -256,25 +252,25 @@ class SequentialClassifier:
         tested = scores.part(counted)
         self.novelty_ = Novelty(*limits_of(tested.novelty, UNUSUAL_RATE))
         self._excess = excess_of(self.novelty_, scores.novelty)
-        self._things = thing_folds(np.where(folds >= 0, labels, ""))
+        self._objects = object_folds(np.where(folds >= 0, labels, ""))
         left_out = None
-        if self._things is not None:
-            self._left_out = scores_without(self._things)
-            left_out = self._left_out.part(self._things >= 0).remoteness
+        if self._objects is not None:
+            self._left_out = scores_without(self._objects)
+            left_out = self._left_out.part(self._objects >= 0).remoteness
         self._bare = remoteness_of(tested.remoteness, left_out)
         self._known = known_of(self._bare, scores.remoteness)
         self.unusual_ = beyond(self.novelty_.limits, scores.novelty)
         self.unknown_ = beyond(self._bare.limits, scores.remoteness)
 
     def _worth(self, never_met: Mapping[str, Evidence]) -> dict[str, float]:
-        """What the doubt about names is worth, by answers to things that were left out;
+        """What the doubt about names is worth, by answers to objects that were held out;
         empty where none could be."""
-        if self._things is None:
+        if self._objects is None:
             return {}
         answers = never_met[self._name]
         stopping = self.stopping_[self._name]
         curve = Curve(stopping.slopes[-1], stopping.intercepts[-1], stopping.doubts[-1])
-        tested = self._tested[self._name] & (self._things >= 0)
+        tested = self._tested[self._name] & (self._objects >= 0)
         remoteness = self._left_out.remoteness[:, tested]
         confidence = curve.probabilities(answers.margins, answers.excess)
         confidence = confidence * known_of(self._bare, remoteness)[-1]
@@ -283,19 +279,19 @@ class SequentialClassifier:
         return worth_of(known, unknown, confidence)
 
     def _never_met(self, vectors: Vectors) -> dict[str, Evidence]:
-        """{task: answers at the full window to trials of things that the deciding model
-        has not met}; none where none could be left out. The vectors are those that the
+        """{task: answers at the full window to trials of objects that the deciding model
+        has not met}; none where none could be held out. The vectors are those that the
         model takes."""
-        things = self._things
-        if things is None:
+        objects = self._objects
+        if objects is None:
             return {}
         at_end = replace(vectors, X=vectors.X[-1:])
-        runs = [[self.choices]] * (int(things.max()) + 1)
-        (answered,) = held_out(at_end, things, [runs], self.jobs, self.heading)
+        runs = [[self.choices]] * (int(objects.max()) + 1)
+        (answered,) = held_out(at_end, objects, [runs], self.jobs, self.heading)
         excess = excess_of(self.novelty_, self._left_out.novelty)[-1]
         evidence = {}
         for task, tested in self._tested.items():
-            answered_to = tested & (things >= 0)
+            answered_to = tested & (objects >= 0)
             margins = answered.margins[task][-1, answered_to]
             right = answered.right[task][-1, answered_to]
             always = np.ones(len(margins))
@@ -317,15 +313,17 @@ class SequentialClassifier:
                 self._tested[task],
             )
         doubts = self.unusual_, self.unknown_
-        courses = self._courses(scores, answered.right, doubts, self._tested)
+        series = self._series(scores, answered.right, doubts, self._tested)
         seconds = np.array(self.decision_points_s)
-        rules = {task: certify(course, seconds) for task, course in courses.items()}
+        rules = {
+            task: certify(time_series, seconds) for task, time_series in series.items()
+        }
         for task, factors in self.products_.items():
-            rules |= agreeing(task, factors, rules, courses, seconds)
+            rules |= agreeing(task, factors, rules, series, seconds)
         full, _ = candidates(len(seconds))
         certified = {}
         for task, of_task in rules.items():
-            _, wrong = courses[task].under(full)
+            _, wrong = series[task].under(full)
             certified[task] = Certified(of_task, len(wrong), int(wrong.sum()))
         return certified
 
@@ -387,8 +385,8 @@ class SequentialClassifier:
         self,
         X: Floats,
         y: Mapping[str, Strings],
-    ) -> tuple[dict[str, Booleans], dict[str, Floats], dict[str, Course]]:
-        """Hits and confidences (points, m) and course of each task, for trials that are
+    ) -> tuple[dict[str, Booleans], dict[str, Floats], dict[str, TimeSeries]]:
+        """Hits and confidences (points, m) and time series of each task, for trials that are
         new.
 
         Args:
@@ -414,22 +412,22 @@ class SequentialClassifier:
         unusual = beyond(self.novelty_.limits, scores.novelty)
         doubts = unusual, beyond(self.remoteness_.limits, scores.remoteness)
         tested = {task: y[task] != "" for task in right}
-        return right, confidence, self._courses(together, right, doubts, tested)
+        return right, confidence, self._series(together, right, doubts, tested)
 
-    def _courses(
+    def _series(
         self,
         scores: Mapping[str, Floats],
         right: Mapping[str, Booleans],
         doubts: tuple[Booleans, Booleans],
         tested: Mapping[str, Booleans],
-    ) -> dict[str, Course]:
-        """{task: its course}, from each task's own answers and confidences for rules
+    ) -> dict[str, TimeSeries]:
+        """{task: its time series}, from each task's own answers and confidences for rules
         (points, n), and whether contacts are unusual and unknown (points, n).
 
         The trials `tested` (n,) count; for a product, those that count for its factors
         too.
         """
-        courses = {}
+        series = {}
         unusual, unknown = doubts
         for task in self.choices:
             deciding = tuple(self.products_.get(task, (task,)))
@@ -437,5 +435,5 @@ class SequentialClassifier:
             sure = [scores[part][:, decided] for part in deciding]
             wrong = [~right[part][:, decided] for part in deciding]
             withheld = unknown[:, decided] if task == self._name else None
-            courses[task] = Course(sure, wrong, unusual[:, decided], withheld)
-        return courses
+            series[task] = TimeSeries(sure, wrong, unusual[:, decided], withheld)
+        return series

@@ -1,16 +1,15 @@
-"""The reports' pictures as PNG, each drawn once for a page and once for a phone."""
+"""The reports' pictures as PNG, and what they share."""
 
 import io
-import textwrap
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import matplotlib as mpl
 import numpy as np
 from matplotlib.figure import Figure as Canvas
-from sklearn.metrics import confusion_matrix
+from sklearn.metrics import ConfusionMatrixDisplay
 
-from edge.arrays import Floats, Integers
+from edge.arrays import Floats
 from train.choose.evaluate import Result
 from train.data.vectors import Strings
 from train.report.section import Figure
@@ -24,8 +23,6 @@ STROKES: tuple[tuple[str, str, Any], ...] = (
     ("#444444", "P", (0, (3, 1, 1, 3))),
 )
 """Colour, marker and dashes of each series, so that no two differ by hue alone."""
-HATCHES = ("", "///", "...", "xxx", "|||", "---")
-"""The hatch of each series of bars."""
 STYLE: dict[Any, Any] = {
     "font.size": 9.0,
     "axes.spines.top": False,
@@ -34,25 +31,20 @@ STYLE: dict[Any, Any] = {
     "grid.alpha": 0.25,
     "axes.axisbelow": True,
     "axes.formatter.useoffset": False,
-    "hatch.linewidth": 0.6,
     "text.parse_math": False,  # a label with two dollar signs is no formula
 }
 WIDE = 7.6
-PHONE = 3.6
+PANEL = 3.6
 """Inches."""
 MATRIX_TEXT = 20
 """A confusion matrix of more classes does not show its numbers."""
-MATRIX_SHARES = 4
-"""One of at most so many classes shows shares too."""
-MANY_CLASSES = 6
-"""One of more classes has smaller rows, and on a phone smaller text."""
 
 
 def picture(
     name: str,
     title: str,
-    draw: Callable[[Any, bool], None],
-    heights: tuple[float, float],
+    draw: Callable[[Any], None],
+    height: float,
     width: float = WIDE,
     style: Mapping[Any, Any] | None = None,
 ) -> Figure:
@@ -61,22 +53,17 @@ def picture(
     Args:
         name: of its file.
         title: its caption.
-        draw: function of an empty canvas, and of whether that is for a phone.
-        heights: inches on a page and on a phone.
-        width: inches on a page.
+        draw: function of an empty canvas.
+        height: inches.
+        width: inches.
         style: further settings of matplotlib.
     """
-    pngs = []
-    for phone in (False, True):
-        # A phone shows the picture smaller, on a finer screen.
-        size, text, dpi = (PHONE, 8.0, 200) if phone else (width, 9.0, 110)
-        with mpl.rc_context({**STYLE, "font.size": text, **(style or {})}):
-            canvas = Canvas(figsize=(size, heights[phone]), layout="constrained")
-            draw(canvas, phone)
-            buffer = io.BytesIO()
-            canvas.savefig(buffer, format="png", dpi=dpi, metadata={"Software": None})
-        pngs.append(buffer.getvalue())
-    return Figure(name, title, *pngs)
+    with mpl.rc_context({**STYLE, **(style or {})}):
+        canvas = Canvas(figsize=(width, height), layout="constrained")
+        draw(canvas)
+        buffer = io.BytesIO()
+        canvas.savefig(buffer, format="png", dpi=110, metadata={"Software": None})
+    return Figure(name, title, buffer.getvalue())
 
 
 def legend(canvas: Any, axes: Any, columns: int) -> None:
@@ -126,145 +113,20 @@ def confusion(name: str, title: str, truth: Strings, answers: Strings) -> Figure
         truth: (n,) labels.
         answers: (n,) the model's.
     """
-    classes = np.union1d(truth, answers)
-    n = len(classes)
-    counts = confusion_matrix(truth, answers, labels=classes)
-    is_large = n > MANY_CLASSES
+    n = len(np.union1d(truth, answers))
 
-    def draw(canvas: Any, phone: bool) -> None:
+    def draw(canvas: Any) -> None:
         axes = canvas.subplots()
-        small = phone and is_large
-        _name_sides(axes, classes, phone)
-        _draw_matrix(axes, counts, fontsize=7 if small else None)
-
-    height = 2.4 + 0.3 * n if is_large else 2.6 + 0.45 * n
-    heights = height, 1.8 + 0.16 * n if is_large else 3.4
-    return picture(name, title, draw, heights, height + 1.6, {"axes.grid": False})
-
-
-def _name_sides(axes: Any, classes: Strings, phone: bool) -> None:
-    """Name the rows and the columns of a confusion matrix."""
-    n = len(classes)
-    is_large = n > MANY_CLASSES
-    small = 7 if (phone and is_large) or n > MATRIX_TEXT else None
-    style = {"rotation": 90} if is_large or phone else {"rotation": 30, "ha": "right"}
-    axes.set_xticks(range(n), classes, fontsize=small, **style)
-    axes.set_yticks(range(n), classes, fontsize=small)
-    axes.set(xlabel="answer", ylabel="label")
-
-
-def _draw_matrix(axes: Any, counts: Integers, fontsize: int | None) -> None:
-    """Draw the counts of a confusion matrix, darker with their share of a row."""
-    n = len(counts)
-    shares = counts / np.maximum(counts.sum(axis=1, keepdims=True), 1)
-    axes.imshow(shares, cmap="Blues", vmin=0, vmax=1, aspect="auto")
-    if n > MATRIX_TEXT:
-        return
-    style = {"ha": "center", "va": "center", "fontsize": fontsize}
-    for i, j in np.argwhere(counts):
-        text = str(counts[i, j])
-        if n <= MATRIX_SHARES:
-            text += f"\n{shares[i, j]:.0%}"
-        colour = "white" if shares[i, j] > 0.55 else "black"
-        axes.text(j, i, text, color=colour, **style)
-
-
-def lines(
-    name: str,
-    title: str,
-    x: Sequence[float],
-    results: Mapping[str, Sequence[Result]],
-    *,
-    label: str,
-    paper: Mapping[str, Mapping[str, float]] | None = None,
-    ticks: Sequence[str] = (),
-) -> Figure:
-    """Accuracy against x, with a line and binomial intervals for each task.
-
-    Args:
-        name: of the picture's file.
-        title: its caption.
-        x: (m,).
-        results: {task: m results}.
-        label: label of the x axis.
-        paper: {task: {x, as text: percent}} of hollow points.
-        ticks: labels of x, which then lie on a logarithmic axis.
-    """
-
-    def draw(canvas: Any, phone: bool) -> None:
-        axes = canvas.subplots()
-        for order, (task, row) in enumerate(results.items()):
-            curve(axes, order, task, x, row)
-            points = (paper or {}).get(task, {})
-            if points:
-                colour, marker, _ = STROKES[order % len(STROKES)]
-                style = {"color": colour, "marker": marker, "mfc": "white", "lw": 0.6}
-                places = list(map(float, points))
-                heights = list(points.values())
-                axes.plot(places, heights, **style, label=f"{task}, paper")
-        if ticks:
-            axes.set_xscale("log")
-            axes.set_xticks(x, ticks)
-            axes.minorticks_off()
-        axes.set(xlabel=label, ylabel="decisions that are right, %", ylim=(0, 103))
-        legend(canvas, axes, 2 if phone else 4)
-
-    return picture(name, title, draw, (3.8, 3.6))
-
-
-def bars(
-    name: str,
-    title: str,
-    names: Sequence[str],
-    groups: Mapping[str, Sequence[Result]],
-    *,
-    marks: Mapping[str, Mapping[str, float]] | None = None,
-    mark: str = "paper",
-) -> Figure:
-    """Bars of accuracy with intervals; those of a name's groups lie side by side.
-
-    Args:
-        name: of the picture's file.
-        title: its caption.
-        names: labels along the axis.
-        groups: {group: result for each name}.
-        marks: {group: {name: percent}} of diamonds.
-        mark: the diamonds' name in the legend.
-    """
-    m = len(names)
-    g = len(groups)
-    height = 0.8 / g
-
-    def draw(canvas: Any, phone: bool) -> None:
-        axes = canvas.subplots()
-        diamonds = []
-        for i, (group, row) in enumerate(groups.items()):
-            y = np.arange(m) + (i - (g - 1) / 2) * height
-            values, arms = spread(row)
-            axes.barh(
-                y,
-                values,
-                height * 0.92,
-                color=STROKES[i % len(STROKES)][0],
-                alpha=0.85,
-                hatch=HATCHES[i % len(HATCHES)],
-                ec="white",
-                lw=0,
-                xerr=arms,
-                error_kw={"ecolor": "0.25", "elinewidth": 0.8},
-                label=group,
-            )
-            for marked, percent in (marks or {}).get(group, {}).items():
-                diamonds.append((percent, y[names.index(marked)]))
-        if diamonds:
-            style = {"color": "black", "mfc": "gold", "ms": 5, "ls": "", "label": mark}
-            axes.plot(*zip(*diamonds, strict=True), marker="D", **style)
-        axes.set_yticks(
-            range(m), [textwrap.fill(n, 18 if phone else 40) for n in names]
+        ConfusionMatrixDisplay.from_predictions(
+            truth,
+            answers,
+            ax=axes,
+            cmap="Blues",
+            colorbar=False,
+            include_values=n <= MATRIX_TEXT,
+            xticks_rotation="vertical",
         )
-        axes.invert_yaxis()
-        axes.set(xlim=(0, 103), xlabel="decisions that are right, %")
-        legend(canvas, axes, 2 if phone else 5)
+        axes.set(xlabel="answer", ylabel="label")
 
-    tall = 1.2 + m * (0.14 + 0.16 * g)
-    return picture(name, title, draw, (tall, tall + 0.4), style={"axes.grid.axis": "x"})
+    height = 2.6 + 0.3 * n
+    return picture(name, title, draw, height, height + 1.6, {"axes.grid": False})

@@ -13,13 +13,12 @@ from sklearn.metrics import precision_recall_fscore_support
 
 from edge.app.commands.explain import Explanation, Space, explain
 from edge.app.commands.info import doubt
+from edge.app.output import counted
 from edge.arrays import Integers
 from edge.decide.model import Model
-from train.choose.evaluate import Result
-from train.data.folds import finest, stratified_folds
 from train.data.labels import NO_CONTACT
 from train.data.vectors import Strings, Vectors
-from train.fitting import Fitted
+from train.fitted import Fitted
 from train.model.pipeline import (
     Choice,
     Choices,
@@ -32,14 +31,12 @@ from train.model.pipeline import (
 )
 from train.model.projection import MOST_STEPS
 from train.report import page
-from train.report.figures import confusion, lines
+from train.report.figures import confusion
 from train.report.score import interval, percent
-from train.report.section import Row, Section, Table, counted
-from train.report.summary import Prices, accuracy, candidates, names, warnings
+from train.report.section import Row, Section, Table
+from train.report.summary import Prices, accuracy, candidates, names
 from train.report.work import Workers
 
-QUARTERS = 4
-"""The learning curve has a point for each of these parts of the training trials."""
 EXPLAINED = 60
 """About this many trials are explained beside the wrong answers."""
 UNTOUCHED = "(no contact)"
@@ -47,15 +44,14 @@ UNTOUCHED = "(no contact)"
 
 @dataclass(frozen=True)
 class Answers:
-    """A task's answers to left-out trials.
+    """A task's answers to held-out trials.
 
     Attributes:
         classes: the task's labels, sorted.
-        truth: (n,) labels; empty where a trial has none, or was never left out.
-        answers: (quarters, n) the answers of fits to growing parts of the other trials;
-            the last fit has all of them.
-        explained: {trial: explanation of the last fit's answer} for the wrong answers
-            and some others.
+        truth: (n,) labels; empty where a trial has none, or was never held out.
+        answers: (n,) the answers of fits to the other trials.
+        explained: {trial: explanation of its answer} for the wrong answers and some
+            others.
     """
 
     classes: list[str]
@@ -66,7 +62,7 @@ class Answers:
     @property
     def wrong(self) -> list[int]:
         """The trials with a wrong answer."""
-        wrong: list[int] = np.flatnonzero(self.answers[-1] != self.truth).tolist()
+        wrong: list[int] = np.flatnonzero(self.answers != self.truth).tolist()
         return wrong
 
 
@@ -97,31 +93,31 @@ def _without_fold(
     vectors: Vectors,
     choices: Choices,
     tests: Mapping[str, Integers],
-) -> dict[str, tuple[list[Strings], dict[int, Explanation]]]:
-    """{task: the results of `_left_out`} of tasks with the same settings, which share
-    their fits, from {task: its left-out trials}."""
+) -> dict[str, tuple[Strings, dict[int, Explanation]]]:
+    """{task: the results of `_held_out`} of tasks with the same settings, which share
+    their fits, from {task: its held-out trials}."""
     shared = Shared(slopes_of([choices], vectors))
     return {
-        task: _left_out(vectors, task, choices, test, shared)
+        task: _held_out(vectors, task, choices, test, shared)
         for task, test in tests.items()
     }
 
 
-def _left_out(
+def _held_out(
     vectors: Vectors,
     task: str,
     choices: Choices,
     test: Integers,
     shared: Shared,
-) -> tuple[list[Strings], dict[int, Explanation]]:
-    """[quarter] (test,) answers to left-out trials, and explanations as `Answers` has
+) -> tuple[Strings, dict[int, Explanation]]:
+    """(test,) answers to held-out trials, and explanations as `Answers` has
     them.
 
     Args:
         vectors: (n, p) of all trials.
         task: the task to answer.
-        choices: each task's settings, chosen without the left-out trials.
-        test: the left-out trials.
+        choices: each task's settings, chosen without the held-out trials.
+        test: the held-out trials.
         shared: whose fits are taken, and added to.
     """
     labels = vectors.y[task]
@@ -129,29 +125,22 @@ def _left_out(
     counting = labels != ""
     counting[test] = False
     training = np.flatnonzero(counting)
-    strata = vectors.y[finest({of: vectors.y[of] for of in choices})]
-    quarter_of = stratified_folds(strata[training], QUARTERS)
     X = vectors.X[test]
-    answers = []
-    for quarter in range(QUARTERS):
-        train = training[quarter_of <= quarter]
-        fewer = vectors.part(train)
-        possible = fittable(choices, fewer.y)
-        fits = shared.fits.setdefault(train.tobytes(), {})
-        model = ContactClassifier.of(possible, fewer, fits, shared.slopes)
-        answers.append(model.tasks_[task].classes[model.decide(X)[task].labels])
+    fewer = vectors.part(training)
+    possible = fittable(choices, fewer.y)
+    fits = shared.fits.setdefault(training.tobytes(), {})
+    model = ContactClassifier.of(possible, fewer, fits, shared.slopes)
+    answers = model.tasks_[task].classes[model.decide(X)[task].labels]
     _, voters = model.tasks_[task].neighbours(X)
-    space = _space(model.tasks_[task], index[train])
+    space = _space(model.tasks_[task], index[training])
     form = vectors.features, vectors.columns
 
     def numbered(neighbour: Any) -> Any:
         """The training trial under its number among all trials; None stays None."""
-        return neighbour and neighbour._replace(row=int(train[neighbour.row]))
+        return neighbour and neighbour._replace(row=int(training[neighbour.row]))
 
     explained = {}
-    for place, (trial, answer) in enumerate(
-        zip(test.tolist(), answers[-1], strict=True)
-    ):
+    for place, (trial, answer) in enumerate(zip(test.tolist(), answers, strict=True)):
         if answer != labels[trial] or trial % max(len(labels) // EXPLAINED, 1) == 0:
             label = int(np.searchsorted(classes, answer))
             truth = int(index[trial])
@@ -178,7 +167,7 @@ def _space(fitted: FittedTask, labels: Integers) -> Space:
 
 
 def answers_of(fitted: Fitted, jobs: int = 1) -> dict[str, Answers]:
-    """{task: its answers to left-out trials}, the same that the nested accuracy
+    """{task: its answers to held-out trials}, the same that the nested accuracy
     counts."""
     choices: list[Choice] = []
     for chosen in fitted.chosen.values():
@@ -192,18 +181,18 @@ def answers_of(fitted: Fitted, jobs: int = 1) -> dict[str, Answers]:
         tested = (chosen.folds >= 0) & (labels != "")
         truth = np.where(tested, labels, "")
         classes = np.unique(labels).tolist()
-        answers[task] = Answers(classes, truth, np.tile(truth, (QUARTERS, 1)), {})
+        answers[task] = Answers(classes, truth, truth.copy(), {})
         for fold, by_task in enumerate(chosen.by_fold):
             test = np.flatnonzero(tested & (chosen.folds == fold))
             if test.size:
-                key = (chosen.left_out, fold, *by_task)
+                key = (chosen.held_out, fold, *by_task)
                 cases.setdefault(key, (by_task, {}))[1][task] = test
     without_fold = partial(_without_fold, vectors)
     of_cases = list(cases.values())
     results = Workers(jobs).map("report", without_fold, of_cases)
     for (_, tests), by_task in zip(of_cases, results, strict=True):
         for task, (answered, explained) in by_task.items():
-            answers[task].answers[:, tests[task]] = answered
+            answers[task].answers[tests[task]] = answered
             answers[task].explained.update(explained)
     return answers
 
@@ -237,10 +226,7 @@ def write(
         "Where entire groups are held out they count groups, whose trials are right or "
         "wrong together.",
         *doubt(model.info.stopping),
-        *(
-            line[0].upper() + line[1:] + "."
-            for line in (*fitted.notes, *warnings(fitted))
-        ),
+        *(line[0].upper() + line[1:] + "." for line in fitted.notes),
     ]
     return page.write(out, f"Model {model.info.name}", lead, sections)
 
@@ -255,7 +241,7 @@ def _accuracy(exported: Exported, task: str) -> Section:
     untouched_answers = [
         label if label == NO_CONTACT else UNTOUCHED for label in untouched
     ]
-    answers = np.array([*answer.answers[-1][tested], *untouched_answers], dtype=str)
+    answers = np.array([*answer.answers[tested], *untouched_answers], dtype=str)
     text = f"{accuracy(chosen)}."
     if untouched:
         text += f" The trials include {counted(len(untouched), 'recording')} without a contact."
@@ -286,7 +272,7 @@ def _accuracy(exported: Exported, task: str) -> Section:
         [
             confusion(
                 f"confusion_{_file(task)}",
-                f"{task}: answers to left-out trials",
+                f"{task}: answers to held-out trials",
                 truth,
                 answers,
             )
@@ -311,7 +297,7 @@ def _wrong(exported: Exported) -> Section:
                     "trial": trials[trial],
                     "task": task,
                     "label": answer.truth[trial],
-                    "answer": answer.answers[-1][trial],
+                    "answer": answer.answers[trial],
                     "nearest trial": trials[why.voters[0].row],
                     "distance": why.voters[0].distance,
                     "distance to its label": why.rival.distance if why.rival else "",
@@ -322,15 +308,15 @@ def _wrong(exported: Exported) -> Section:
         "A model that had not seen these trials classified them wrongly. The last "
         "column names the feature that pulls a trial most strongly towards the wrong "
         "answer, compared with the nearest trial of the right label. Wrong labels and "
-        "failed touches often stand out here. `edge-classify explain` and `python -m "
-        "train show` explain any recording in the same way."
+        "failed touches often stand out here. `edge-classify explain` explains any "
+        "recording in the same way."
     ]
     table = Table("wrong", "Wrong answers", rows)
     return Section("Wrong answers", text if rows else ["None."], [table])
 
 
 def _features(exported: Exported) -> Section:
-    """Each feature's share in the answers to left-out trials."""
+    """Each feature's share in the answers to held-out trials."""
     fitted = exported.fitted
     dataset = fitted.dataset
     rows = []
@@ -352,47 +338,10 @@ def _features(exported: Exported) -> Section:
         "A feature's pull says how much nearer the feature brings a touch to the "
         "nearest trial with the model's answer than to the nearest trial with another "
         "label. The table gives each feature's share of all pulls, as a mean over the "
-        f"wrong answers and about {EXPLAINED} other left-out trials."
+        f"wrong answers and about {EXPLAINED} other held-out trials."
     ]
-    table = Table("features", "Each feature's share of the pull", rows, narrow=3)
+    table = Table("features", "Each feature's share of the pull", rows)
     return Section("Features", text, [table])
-
-
-def _learning(exported: Exported) -> Section:
-    """The accuracy with fewer training trials."""
-    n = len(exported.fitted.dataset.trials)
-    folds = max(len(chosen.by_fold) for chosen in exported.fitted.chosen.values())
-    largest = n * (1.0 - 1.0 / folds)
-    sizes = [round(largest * quarter / QUARTERS) for quarter in range(1, QUARTERS + 1)]
-    rows: list[Row] = [{"trials": size} for size in sizes]
-    half = QUARTERS // 2 - 1
-    text = []
-    results = {}
-    for task, answer in exported.answers.items():
-        hits = (answer.answers == answer.truth)[:, answer.truth != ""]
-        results[task] = [Result(int(quarter.sum()), quarter.size) for quarter in hits]
-        accuracies = [result.accuracy for result in results[task]]
-        for row, share in zip(rows, accuracies, strict=True):
-            row[f"{task} %"] = percent(share)
-        text.append(
-            f"{task}: doubling the training trials from {sizes[half]} to {sizes[-1]} "
-            "changed the accuracy by "
-            f"{100 * (accuracies[-1] - accuracies[half]):+.1f} percentage points."
-        )
-    text.append(
-        "Doubling them again usually changes less. All fits use the settings that were "
-        "chosen on the full training set, and the smaller sets contain the same "
-        "objects. To recognise unseen objects, record more "
-        "objects rather than more touches of the same ones."
-    )
-    title = "Accuracy by the number of training trials"
-    figure = lines("learning", title, sizes, results, label="training trials")
-    return Section(
-        "The value of more recordings",
-        text,
-        [Table("learning", title, rows)],
-        [figure],
-    )
 
 
 def _sizes(exported: Exported) -> Section:
@@ -417,7 +366,6 @@ def _sizes(exported: Exported) -> Section:
 SECTIONS: tuple[Callable[[Exported], Section], ...] = (
     _wrong,
     _features,
-    _learning,
     _sizes,
 )
 """The sections after those of each task's accuracy."""

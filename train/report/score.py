@@ -7,11 +7,10 @@ import numpy as np
 
 from edge.arrays import Booleans, Floats, Integers
 from edge.decide import statistics
-from edge.touch.features import FEATURES
+from edge.features.vector import FEATURES
 from train.choose.crossval import MAX_COMPONENTS, accuracies, neighbours
-from train.choose.evaluate import Result, evaluate, nested_accuracy
-from train.choose.search import SearchGrid
-from train.data.vectors import Labels, Strings, Vectors
+from train.choose.evaluate import Result
+from train.data.vectors import Labels, Strings
 from train.model.pipeline import vote
 
 
@@ -44,29 +43,6 @@ def score(result: Result) -> dict[str, Any]:
         "k": result.k or "",
         "components": result.components or "",
     }
-
-
-def nested(
-    X: Floats,
-    y: Labels,
-    folds: Integers,
-    *,
-    grid: SearchGrid,
-    features: Sequence[str],
-    widths: Sequence[int] | None = None,
-) -> dict[str, Result]:
-    """Each task's nested accuracy over a grid; see `train.choose.evaluate`.
-
-    Args:
-        X: (n, p) feature vectors.
-        y: {task: (n,) labels}.
-        folds: (n,) from 0.
-        grid: the settings to choose from.
-        features: names of the feature types in X.
-        widths: columns of each; equal where None.
-    """
-    table = evaluate(Vectors(X, y, features, widths), folds, [grid])
-    return {task: nested_accuracy(table, task) for task in y}
 
 
 def voted(rows: Integers, y: Strings, components: int, k: int) -> Result:

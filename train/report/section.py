@@ -4,6 +4,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
+import pandas as pd
+
 Row = dict[str, Any]
 """{column: cell} of a table."""
 
@@ -19,25 +21,18 @@ class Table:
             is empty. A table without rows is left out of the report.
         timed: columns measured by a clock, which differ from run to run; they go to a
             CSV file of their own, beside the first column.
-        narrow: number of columns, from the first, that a phone shows; the CSV has them
-            all.
     """
 
     name: str
     title: str
     rows: Sequence[Row]
     timed: tuple[str, ...] = ()
-    narrow: int = 4
 
     @property
-    def columns(self) -> list[str]:
-        """The headings, in the order in which the rows first have them."""
-        return list(dict.fromkeys(column for row in self.rows for column in row))
-
-    @property
-    def cells(self) -> list[list[Any]]:
-        """The cells of each row, in the order of `columns`."""
-        return [[row.get(column, "") for column in self.columns] for row in self.rows]
+    def frame(self) -> pd.DataFrame:
+        """The rows, with columns in the order in which the rows first have them."""
+        columns = list(dict.fromkeys(column for row in self.rows for column in row))
+        return pd.DataFrame(self.rows, columns=columns, dtype=object).fillna("")
 
 
 @dataclass
@@ -48,13 +43,11 @@ class Figure:
         name: name of its file.
         title: its caption, which also describes it to readers who cannot see it.
         png: its bytes.
-        narrow: the bytes of a version drawn for a phone.
     """
 
     name: str
     title: str
     png: bytes
-    narrow: bytes
 
 
 @dataclass
@@ -67,7 +60,6 @@ class Section:
         tables: shown below the plots.
         figures: shown below the text.
         terms: {word: explanation} of a glossary.
-        widget: HTML with its own script, shown above the text.
     """
 
     title: str
@@ -75,9 +67,3 @@ class Section:
     tables: Sequence[Table] = ()
     figures: Sequence[Figure] = ()
     terms: Mapping[str, str] = field(default_factory=dict)
-    widget: str = ""
-
-
-def counted(count: int, noun: str) -> str:
-    """The count with its noun, as in `1 recording` and `2 recordings`."""
-    return f"{count:,} {noun}{'' if count == 1 else 's'}"

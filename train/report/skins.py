@@ -9,13 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from edge.arrays import Floats
+from edge.features.vector import FEATURES, SAMPLES, WINDOW_S, feature_vector
 from edge.record.recording import Recording
 from edge.touch.arm import Chain
 from edge.touch.contact import FeatureSeries
-from edge.touch.features import FEATURES, SAMPLES, WINDOW_S, feature_vector
-from edge.touch.first_contact import first_contact
 from edge.touch.layout import SkinLayout, for_device
-from edge.touch.track import ContactTracker
+from edge.touch.track import ContactTracker, first_contact
 
 
 def follow(

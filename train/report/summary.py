@@ -2,77 +2,65 @@
 
 import os
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-import numpy as np
-from sklearn.neighbors import NearestNeighbors
-
 from edge.app.commands.info import doubt
-from edge.arrays import Floats
+from edge.app.output import counted
 from edge.errors import printable
-from edge.touch import measures
-from train.choose.protocols import HALVINGS
+from edge.features import names as measures
 from train.choose.settings import Chosen
-from train.data import outliers
 from train.data.dataset import DataSet
 from train.data.feature_sets import SETS, expand, moves
 from train.data.groups import TRIAL
-from train.data.labels import NO_CONTACT
-from train.fitting import Fitted
-from train.model.pipeline import Choice, squared_distances
-from train.model.projection import FEWEST_UNITS
+from train.fitted import Fitted
+from train.model.pipeline import Choice
 from train.report.score import interval
-from train.report.section import Row, Table, counted
+from train.report.section import Row, Table
 
-MISSING_SHARE = 0.02
-"""Share of recordings without a contact above which the thresholds get a warning."""
-LEAK = 0.5
-"""Share of labels that the posture at onset tells, above which it gets a warning."""
-MOST_JUDGED = 1000
-"""Of more trials, every second, third and so on is judged."""
-NAMED = 3
-"""A sentence names so many files and counts the rest."""
 Prices = Sequence[tuple[float, float]]
 """Microseconds of a decision on this machine, and kilobytes, for each candidate."""
 
 
-def summary(fitted: Fitted, prices: Prices) -> str:
-    """The candidates, the choice for each task, notes and warnings, as lines of
-    text."""
+def summary(fitted: Fitted, most_lines: int | None = None) -> list[str]:
+    """The accuracy of each task, what was chosen, doubts and notes, as lines of text.
+
+    Args:
+        fitted: the result of `train.fit`.
+        most_lines: notes beyond them are counted, those last that are no warnings.
+    """
+    lines = [f"{task}: {accuracy(chosen)}" for task, chosen in fitted.chosen.items()]
+    tasks_of: dict[str, list[str]] = {}
+    for task, chosen in fitted.chosen.items():
+        tasks_of.setdefault(_described(chosen.choice, fitted), []).append(task)
+    lines += [
+        f"settings of {', '.join(tasks)}: {text}" for text, tasks in tasks_of.items()
+    ]
+    lines += doubt({} if fitted.sequential is None else fitted.sequential.stopping_)
+    lines += sorted(fitted.notes, key=lambda note: not note.startswith("warning: "))
+    if most_lines is None or len(lines) <= most_lines:
+        return lines
+    more = counted(len(lines) - most_lines + 1, "note")
+    return [*lines[: most_lines - 1], f"{more} more in the report and with --verbose"]
+
+
+def details(fitted: Fitted, prices: Prices) -> list[str]:
+    """The candidates, the settings of early decisions, and the features with their
+    units, as lines of text."""
     lines = [
-        *_aligned(candidates(fitted, prices)),
+        candidates(fitted, prices).frame.to_string(index=False),
         "* chosen; in brackets, the 95 % interval of the accuracy on other trials; "
         "- dropped after a few folds, as behind or no better than a cheaper one",
-        "",
     ]
-    for task, chosen in fitted.chosen.items():
-        lines.append(f"{task}: {accuracy(chosen)}")
-        lines.append(f"  {_described(chosen.choice, fitted)}")
-        lines.append(
-            f"  halves of the folds choose the same features and projection in "
-            f"{chosen.agreed} of {HALVINGS} divisions"
-        )
-        if fitted.early is not None:
-            early = _described(fitted.early.choices[task], fitted)
-            lines.append(f"  before {fitted.window_s:g} s: {early}")
-    lines += ["", *_by_unit(fitted.dataset.units)]
+    if fitted.early is not None:
+        before = f"before {fitted.window_s:g} s"
+        for task, choice in fitted.early.choices.items():
+            lines.append(f"{task}, {before}: {_described(choice, fitted)}")
+    lines += _by_unit(fitted.dataset.units)
     if any(map(moves, map(measures.feature, fitted.dataset.names))):
         frame = "along the skin" if fitted.dataset.chain is None else "in the world"
         lines.append(f"contact motion is measured {frame}")
-    sequential = fitted.sequential
-    lines += doubt({} if sequential is None else sequential.stopping_)
-    return "\n".join([*lines, *fitted.notes, *warnings(fitted)])
-
-
-def _aligned(table: Table) -> list[str]:
-    """The lines of a table: two columns to the left, the others to the right."""
-    rows = [list(map(str, row)) for row in (table.columns, *table.cells)]
-    columns = []
-    for i, column in enumerate(zip(*rows, strict=True)):
-        width = max(map(len, column))
-        columns.append([c.ljust(width) if i < 2 else c.rjust(width) for c in column])
-    return list(map("  ".join, zip(*columns, strict=True)))
+    return lines
 
 
 def _by_unit(units: Mapping[str, str]) -> list[str]:
@@ -104,20 +92,20 @@ def candidates(fitted: Fitted, prices: Prices) -> Table:
         row["us per decision"] = round(us, 1)
         row["kB"] = round(kilobytes, 1)
         rows.append(row)
-    return Table("candidates", "Candidates", rows, ("us per decision",), narrow=3)
+    return Table("candidates", "Candidates", rows, ("us per decision",))
 
 
 def accuracy(chosen: Chosen) -> str:
     """The nested accuracy of a task in words."""
     result = chosen.accuracy
-    numbers = (
-        f"{result.accuracy:.1%} of {result.total} trials are classified correctly "
-        f"(95 % interval {interval(result)}), each by a model chosen and fitted without "
+    text = (
+        f"{result.accuracy:.1%} of {result.total} trials are right (95 % interval "
+        f"{interval(result)}), each held out"
     )
-    if chosen.left_out == TRIAL:
-        return f"{numbers}this trial"
-    alone = f"{chosen.by_trial.accuracy:.1%} if only the trial itself is held out"
-    return f"{numbers}any trial of the same {chosen.left_out}; {alone}"
+    if chosen.held_out == TRIAL:
+        return text
+    alone = f"{chosen.by_trial.accuracy:.1%} where it is held out alone"
+    return f"{text} with all of its {chosen.held_out}; {alone}"
 
 
 def _described(choice: Choice, fitted: Fitted) -> str:
@@ -132,146 +120,6 @@ def _described(choice: Choice, fitted: Fitted) -> str:
         if choice.targets:
             how += f", with the discriminants of {' and '.join(choice.targets)} side by side"
     return f"{how}, {counted(choice.components, 'component')}, k = {choice.k}"
-
-
-def warnings(fitted: Fitted) -> list[str]:
-    """Sentences on data that make a model worse, or make it look better than it is."""
-    dataset = fitted.dataset
-    lines = [*_untouched(dataset), *_left_out(dataset)]
-    lines += _outliers(fitted)
-    longest = max(
-        float(trial.recording.t[-1]) - trial.onset_s for trial in dataset.trials
-    )
-    if fitted.window_s > longest + 1e-9:
-        lines.append(
-            f"warning: the window of {fitted.window_s:g} s is too long: every "
-            f"recording ends within {longest:.2f} s of the onset"
-        )
-    for task in fitted.chosen:
-        lines += _task_warnings(fitted, task)
-    return lines
-
-
-def _untouched(dataset: DataSet) -> Iterator[str]:
-    """A sentence on the recordings without a contact whose labels name one."""
-    paths = [
-        path for path, labels in dataset.untouched if NO_CONTACT not in labels.values()
-    ]
-    if not paths:
-        return
-    line = f"no contact above {dataset.layout.onset} counts, so counted as wrong: "
-    line += _files(paths)
-    total = len(dataset.trials) + len(dataset.untouched)
-    if len(paths) / total > MISSING_SHARE:
-        line = f"warning: {line}; `edge-classify thresholds` proposes thresholds"
-    yield line
-
-
-def _left_out(dataset: DataSet) -> Iterator[str]:
-    """Sentences on recordings, and on contacts of a recording, that are not used."""
-    files = {trial.path for trial in dataset.trials}
-    for lacking, paths in dataset.left_out.items():
-        yield (
-            f"warning: {len(paths)} of {len(files.union(paths))} recordings are skipped "
-            f"for lack of {lacking}: {_files(paths)}"
-        )
-    if dataset.unused:
-        yield (
-            "warning: only the first of several contacts is used in "
-            f'{_files(dataset.unused)}; with meta.contacts of "alike" each is a trial'
-        )
-
-
-def _outliers(fitted: Fitted) -> Iterator[str]:
-    """Sentences on recordings far outside all others, by features of the model.
-
-    Features of single taxels are left out: most trials do not touch a taxel, so that
-    any touch of it lies far outside.
-    """
-    measured = fitted.measured
-    by_joints = list(outliers.by_joints(measured))
-    yield from by_joints[:NAMED]
-    more = len(by_joints) - NAMED
-    if more > 0:  # angles in degrees are beyond the limits in every recording
-        yield f"warning: {counted(more, 'further recording')} with such joint angles"
-    names = [
-        name
-        for name in fitted.dataset.names
-        if "kernels" not in name and not measures.feature(name).wide
-    ]
-    if names:
-        used = fitted.dataset.of(names)
-        X = used.features(fitted.window_s, fitted.samples)
-        yield from outliers.by_features(used, X, used.widths(fitted.samples))
-
-
-def _task_warnings(fitted: Fitted, task: str) -> Iterator[str]:
-    """The sentences that concern a single task."""
-    fitted_task = fitted.classifier.tasks_[task]
-    choice = fitted.chosen[task].choice
-    components = fitted_task.components
-    if any(measures.feature(n).quantity == "joint_angle" for n in choice.features):
-        share = posture_accuracy(fitted.dataset, task)
-        yield (
-            f"{'warning: ' if share > LEAK else ''}{task}: the joint angles at onset alone "
-            f"give {share:.1%} of the labels (1-NN, leave-one-out), so the model may "
-            "recognise places instead of objects; leave posture out of --features to judge "
-            "touch alone"
-        )
-    if choice.components > components and choice.projection == "pca":
-        yield (
-            f"warning: {task}: the trials span {components} components, "
-            f"{choice.components - components} fewer than asked for"
-        )
-    rows = fitted_task.rows
-    members = fitted_task.space.members
-    _, different = np.unique(fitted.X[members], axis=0, return_index=True)
-    steps = coarseness(rows[different], fitted_task.unit)
-    if rows.any() and steps < FEWEST_UNITS:
-        farthest = members[(rows**2).sum(axis=1).argmax()]
-        yield (
-            f"warning: {task}: half of the trials lie within {steps:.0f} of the "
-            "model's steps from another trial, because "
-            f"{fitted.dataset.trials[farthest].path} lies far outside all others; "
-            "leave it out if the recording is wrong"
-        )
-
-
-def coarseness(rows: Floats, unit: float) -> float:
-    """The coarseness of a model's grid for its trials, judged by at most a thousand of
-    them.
-
-    Args:
-        rows: (n, c) projected trials, of which no two have the same features.
-        unit: of their coordinates.
-
-    Returns:
-        The median distance, in units, from a trial to the nearest other one. It is 0 if
-        a trial so far outside leaves all others the same coordinates, and infinite for
-        a single trial.
-    """
-    every = -(-len(rows) // MOST_JUDGED)
-    squares = squared_distances(rows[::every], rows)
-    judged = np.arange(len(squares))
-    squares[judged, every * judged] = np.inf
-    return float(np.sqrt(np.median(squares.min(axis=1)))) / unit
-
-
-def posture_accuracy(dataset: DataSet, task: str) -> float:
-    """Leave-one-out accuracy of a task with the joint angles at onset alone and one
-    neighbour."""
-    at_onset = []
-    for trial in dataset.trials:
-        joints = trial.series.joints
-        assert joints is not None
-        finite = joints[np.isfinite(joints).all(axis=1)]
-        at_onset.append(finite[0] if len(finite) else np.zeros(joints.shape[1]))
-    labels = dataset.labels(task)
-    angles = np.array(at_onset)[labels != ""]
-    labels = labels[labels != ""]
-    neighbours = NearestNeighbors(n_neighbors=1).fit(angles)
-    nearest = neighbours.kneighbors(return_distance=False)[:, 0]
-    return float((labels[nearest] == labels).mean())
 
 
 def names(dataset: DataSet) -> tuple[str, tuple[str, ...]]:
@@ -292,10 +140,3 @@ def names(dataset: DataSet) -> tuple[str, tuple[str, ...]]:
             name += f" {numbers[path]}"
         trials.append(name)
     return printable(folder.name), tuple(trials)
-
-
-def _files(paths: Sequence[Path]) -> str:
-    """The first paths, and the number of the others."""
-    text = ", ".join(map(str, paths[:NAMED]))
-    rest = len(paths) - NAMED
-    return f"{text} and {rest} more" if rest > 0 else text

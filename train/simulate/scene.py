@@ -10,8 +10,7 @@ from typing import Any
 from edge.config import REQUIRED, ConfigTable, read_toml
 from edge.errors import InputError
 from edge.record.npz import LARGEST_BYTES
-from edge.touch.arm import Chain
-from edge.touch.arm_file import read_arm
+from edge.touch.arm import Chain, read_arm
 from edge.wire.skin.file import shipped
 from train.simulate import schema
 from train.simulate.families import draw_family

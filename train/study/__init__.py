@@ -1,2 +1,1 @@
-"""The paper's study on any data set: every analysis, ours beside the paper's, and
-beyond it."""
+"""The paper's study on any data set, ours beside the paper's."""

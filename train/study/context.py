@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 from edge.arrays import Floats
-from edge.touch.features import FEATURES, SAMPLES, WINDOW_S
+from edge.features.vector import FEATURES, SAMPLES, WINDOW_S
 from train.data.dataset import DataSet
 from train.data.vectors import Labels
 from train.report.work import Workers
@@ -31,10 +31,6 @@ class Context:
         y = {task: self.dataset.labels(task) for task in self.dataset.tasks}
         return {task: labels for task, labels in y.items() if len(set(labels)) > 1}
 
-    def vectors(
-        self,
-        window_s: float = WINDOW_S,
-        names: Sequence[str] = FEATURES,
-    ) -> Floats:
+    def vectors(self, names: Sequence[str] = FEATURES) -> Floats:
         """The trials' feature vectors."""
-        return self.dataset.features(window_s, SAMPLES, names)
+        return self.dataset.features(WINDOW_S, SAMPLES, names)

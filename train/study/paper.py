@@ -3,16 +3,15 @@
 import csv
 import math
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
+from edge.app.output import counted
 from edge.decide.statistics import wilson
-from train.report.figures import STROKES, legend, picture
-from train.report.section import Figure, Row, Section, Table, counted
+from train.report.section import Row, Section, Table
 
 Numbers = dict[tuple[str, str, str], float]
 """{(table, setting, task): accuracy in percent}."""
@@ -75,7 +74,7 @@ def papers(table: str, task: str) -> dict[str, float]:
 def difference(paper: float, ours: float, tested: int) -> tuple[float, float]:
     """95 % interval of our accuracy minus the paper's, in percentage points.
 
-    Two studies of the same thing differ by chance in both. An interval around one of
+    Two studies of the same question differ by chance in both. An interval around one of
     them alone would exclude a perfect replication one time in six (Newcombe, Statistics
     in Medicine 17, 1998, method 10, for two samples).
 
@@ -106,24 +105,6 @@ def mean_of(data_sets: Sequence[Numbers]) -> Numbers:
     }
 
 
-def right_despite_the_object(numbers: Numbers) -> float:
-    """Percent of the trials with a wrong object whose category is right, as a mean over
-    settings.
-
-    The right object nearly implies the right category. So the trials by which the
-    category's accuracy exceeds the object's are trials with a wrong object.
-
-    Args:
-        numbers: percent, with category and object of each setting.
-    """
-    shares = []
-    for (table, setting, task), percent in numbers.items():
-        named = numbers.get((table, setting, "object"), 100.0)
-        if task == "category" and named < 100.0:
-            shares.append(100.0 * (percent - named) / (100.0 - named))
-    return float(np.mean(shares)) if shares else np.nan
-
-
 def comparison(data_sets: Sequence[Numbers], tested: int) -> Section:
     """Each of the paper's accuracies beside ours.
 
@@ -133,8 +114,7 @@ def comparison(data_sets: Sequence[Numbers], tested: int) -> Section:
     """
     mean = mean_of(data_sets)
     shared = [entry for entry in entries() if entry.key in mean]
-    row_of = {entry: _beside(entry, mean[entry.key], tested) for entry in shared}
-    rows = list(row_of.values())
+    rows = [_beside(entry, mean[entry.key], tested) for entry in shared]
     # {(within the interval, a headline): number}
     counts = Counter((row["within"], row["headline"]) for row in rows)
     predicted = counts["yes", ""]
@@ -157,10 +137,8 @@ def comparison(data_sets: Sequence[Numbers], tested: int) -> Section:
             "scene were chosen to meet these, so they are no predictions. Of the other "
             f"{predictions}, {predicted} agree. Nothing was changed to meet them.",
             _disagreements([row for row in rows if row["within"] == "no"]),
-            *_wrong_objects({e.key: e.percent for e in row_of}, mean),
         ],
-        [Table("paper", "The paper's accuracies and ours", rows)],
-        [_against(row_of, title)],
+        [Table("paper", title, rows)],
     )
 
 
@@ -186,23 +164,6 @@ def _beside(entry: Entry, ours: float, tested: int) -> Row:
     }
 
 
-def _wrong_objects(theirs: Numbers, ours: Numbers) -> list[str]:
-    """A paragraph on the category in trials with a wrong object; none if a task is
-    missing."""
-    paper_percent = right_despite_the_object(theirs)
-    ours_percent = right_despite_the_object({key: ours[key] for key in theirs})
-    if np.isnan(paper_percent) or np.isnan(ours_percent):
-        return []
-    return [
-        "When the classifier names the wrong object, it still names the right category "
-        f"in {paper_percent:.0f} % of the trials in the paper and in "
-        f"{ours_percent:.0f} % here, as a mean over the settings that have both "
-        "tasks; guessing among four categories gives 25 %. A higher share means that the "
-        "objects of a category feel more alike: a skin that is too coarse to recognise "
-        "the object still recognises its category."
-    ]
-
-
 def _disagreements(outside: Sequence[Row]) -> str:
     """A paragraph on the numbers outside their interval."""
     if not outside:
@@ -219,34 +180,3 @@ def _disagreements(outside: Sequence[Row]) -> str:
         "lower one means that it lacks some. In Table II some of the paper's methods "
         "are the same classifier; see the section on scaling."
     )
-
-
-def _against(row_of: Mapping[Entry, Row], title: str) -> Figure:
-    """Our accuracies against the paper's; a point is hollow if its interval misses the
-    diagonal."""
-    marks = dict(zip(dict.fromkeys(e.table for e in row_of), "os^", strict=False))
-    strokes = dict(zip(sorted({e.task for e in row_of}), STROKES, strict=False))
-    lowest = min(min(row["paper %"], row["ours %"]) for row in row_of.values())
-    ends = (lowest - 4.0, 102.0)
-
-    def draw(canvas: Any, phone: bool) -> None:
-        axes = canvas.subplots()
-        axes.plot(ends, ends, color="0.4", lw=1, label="equal")
-        for entry, row in row_of.items():
-            colour, _, dashes = strokes[entry.task]
-            x = entry.percent
-            bar = [x + row["from"], x + row["to"]]
-            axes.plot([x, x], bar, color=colour, lw=1, alpha=0.6, ls=dashes)
-            style = {"color": colour, "ms": 6}
-            style["mfc"] = colour if row["within"] == "yes" else "white"
-            axes.plot(x, row["ours %"], marks[entry.table], **style)
-        for task, (colour, _, dashes) in strokes.items():
-            axes.plot([], [], ls=dashes, color=colour, lw=2, label=task)
-        for table, mark in marks.items():
-            axes.plot([], [], mark, color="0.3", label=f"Table {table}")
-        axes.plot([], [], "o", color="0.3", mfc="white", label="disagrees")
-        axes.set(xlabel="the paper's accuracy, %", ylabel="our accuracy, %")
-        axes.set(xlim=ends, ylim=ends)
-        legend(canvas, axes, 3 if phone else 4)
-
-    return picture("paper", title, draw, (5.6, 4.4))

@@ -7,32 +7,26 @@ from dataclasses import replace
 from itertools import chain
 from pathlib import Path
 
+from edge.app.output import counted
 from edge.errors import InputError
 from train.data.dataset import DataSet, Measurement, load_trials
-from train.data.feature_sets import expand
 from train.report.page import write
-from train.report.section import Section, counted
+from train.report.section import Section
 from train.report.work import Workers
 from train.simulate import scene as scenes
 from train.simulate.run import write as simulate
 from train.simulate.scene_model import Scene
-from train.study import methods, paper, sweeps
+from train.study import paper, sweeps
 from train.study.context import Context
 
-COMPARED = (sweeps.resolution, sweeps.scaling, sweeps.features)
-"""The analyses for which the paper has numbers."""
 TABLES = {"resolution": "I", "scaling": "II", "features": "III"}
 """{our table: the paper's table of the same settings}."""
-ANALYSES: tuple[Callable[[Context], Section | None], ...] = (
-    methods.section,
-    sweeps.confusion,
+ANALYSES: tuple[Callable[[Context], Section], ...] = (
     sweeps.resolution,
-    sweeps.window,
     sweeps.scaling,
     sweeps.features,
 )
-"""The report's analyses, in its order; one that does not apply to the data set gives
-None."""
+"""The report's analyses, in its order."""
 LONGEST_S = 2.0
 FEWEST = 20
 """Smallest number of trials, because the grid has 20 components."""
@@ -44,8 +38,8 @@ def _studied(data: Sequence[str]) -> DataSet:
     Raises:
         InputError: they are too few.
     """
-    names = expand([name for name, _ in methods.OURS])
-    dataset = load_trials(data, Measurement(names, LONGEST_S), progress=True)
+    measurement = Measurement(horizon_s=LONGEST_S)
+    dataset = load_trials(data, measurement, progress=True)
     if len(dataset.trials) < FEWEST:
         raise InputError(
             f"a study needs at least {FEWEST} trials, not {len(dataset.trials)}; "
@@ -113,16 +107,16 @@ def study(
 
 
 def _analysed(context: Context, seeds: int) -> list[Section]:
-    """The sections of the analyses that apply to the data set, in their order."""
+    """The sections of the analyses, after their comparison with the paper's where the
+    trials are simulated."""
     sections = [analysis(context) for analysis in ANALYSES]
-    applicable = list(filter(None, sections))
     scene = context.scene
-    if scene is not None:
-        numbers = [_numbers(applicable)]
-        numbers += [_of_another_seed(context, scene, i) for i in range(1, seeds)]
-        trials = seeds * len(context.dataset.trials)
-        applicable.insert(1, paper.comparison(numbers, trials))
-    return applicable
+    if scene is None:
+        return sections
+    numbers = [_numbers(sections)]
+    numbers += [_of_another_seed(context, scene, i) for i in range(1, seeds)]
+    trials = seeds * len(context.dataset.trials)
+    return [paper.comparison(numbers, trials), *sections]
 
 
 def _lead(context: Context, constant: Sequence[str]) -> list[str]:
@@ -141,8 +135,8 @@ def _lead(context: Context, constant: Sequence[str]) -> list[str]:
     lead = [
         f"{counted(len(dataset.trials), 'trial')} on {layout.rows} x {layout.cols} "
         f"taxels, with the tasks {tasks}. Force is in {layout.force_unit}s; motion is "
-        f"in {layout.length_unit}s, in the frame of the {frame}. {source} Apart from "
-        "the findings, accuracies come from leave-one-out cross-validation, with 95 % "
+        f"in {layout.length_unit}s, in the frame of the {frame}. {source} "
+        "Accuracies come from leave-one-out cross-validation, with 95 % "
         "binomial (Wilson) intervals."
     ]
     if constant:
@@ -162,8 +156,10 @@ def _numbers(sections: Sequence[Section]) -> paper.Numbers:
     numbers = {}
     for table in chain.from_iterable(section.tables for section in sections):
         if table.name in TABLES:
-            for setting, task, accuracy, *_ in table.cells:
-                numbers[TABLES[table.name], str(setting), task] = accuracy
+            for row in table.rows:
+                setting = str(next(iter(row.values())))
+                key = TABLES[table.name], setting, row["task"]
+                numbers[key] = row["accuracy %"]
     return numbers
 
 
@@ -174,4 +170,4 @@ def _of_another_seed(context: Context, scene: Scene, i: int) -> paper.Numbers:
         simulate(replace(scene, seed=scene.seed + i), folder)
         dataset = load_trials([folder], Measurement(horizon_s=LONGEST_S))
     another = replace(context, dataset=dataset)
-    return _numbers([analysis(another) for analysis in COMPARED])
+    return _numbers([analysis(another) for analysis in ANALYSES])

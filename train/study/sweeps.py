@@ -1,109 +1,38 @@
-"""The paper's own analyses of the features: Figs. 6 to 10, Tables I to III."""
+"""The paper's own analyses of the features: its Tables I to III."""
 
 from collections.abc import Mapping, Sequence
 from itertools import combinations
 from typing import Any
 
+from edge.features.vector import FEATURES
 from edge.record.recording import Recording
 from edge.touch.arm import Chain
-from edge.touch.features import FEATURES
 from edge.touch.layout import SkinLayout
 from train.choose.evaluate import Result
 from train.data.vectors import Labels
 from train.model.scaling import OF_PAPER
-from train.report import figures
 from train.report.score import grid_search, score
 from train.report.section import Row, Section, Table
 from train.report.skins import coarser, follow, vectors
 from train.study.context import Context
 from train.study.paper import papers
 
-WINDOWS_S = tuple(tenths / 10 for tenths in (*range(1, 12), *range(12, 21, 2)))
 SUBSETS = tuple(names for size in (1, 2, 3) for names in combinations(FEATURES, size))
 
 Results = Mapping[Any, Mapping[str, Result]]
 """{setting: {task: result}}."""
 
 
-def by_task(results: Results) -> dict[str, list[Result]]:
-    """{task: its result in each setting}."""
-    tasks = next(iter(results.values()))
-    return {task: [result[task] for result in results.values()] for task in tasks}
-
-
-def rows(column: str, results: Results, table: str = "") -> list[Row]:
-    """A row for each setting and task, with the accuracy in a table of the paper, if
-    given."""
+def rows(column: str, results: Results, table: str) -> list[Row]:
+    """A row for each setting and task, with the accuracy in a table of the paper, where
+    it has one."""
     cells = []
     for setting, tasks in results.items():
         for task, result in tasks.items():
             row: Row = {column: setting, "task": task, **score(result)}
-            if table:
-                row["paper %"] = papers(table, task).get(str(setting), "")
+            row["paper %"] = papers(table, task).get(str(setting), "")
             cells.append(row)
     return cells
-
-
-def confusion(context: Context) -> Section:
-    """Confusion matrices of the paper's classifier (Figs. 6 to 8)."""
-    best: list[Row] = []
-    pictures = []
-    for task, result in grid_search(context.vectors(), context.labels).items():
-        truth = context.labels[task]
-        assert result.answers is not None
-        size = {"task": task, "classes": len(set(truth)), "trials": result.total}
-        best.append(size | score(result))
-        title = f"{task}: the label that each touch was given, by leave-one-out"
-        pictures.append(
-            figures.confusion(f"confusion_{task}", title, truth, result.answers)
-        )
-    return Section(
-        "Classification (Figs. 6 to 8)",
-        [
-            "The classifier uses the paper's three features over 1.2 s, unscaled. A "
-            "grid search with leave-one-out tries 1 to 20 components and k from 1 to "
-            "20, and takes the smallest of equally accurate models. The accuracy shown "
-            "is the one that the search maximised, so it is too high."
-        ],
-        [
-            Table(
-                "classification",
-                "The best number of components and k for each task",
-                best,
-            )
-        ],
-        pictures,
-    )
-
-
-def window(context: Context) -> Section:
-    """Accuracy at each time window (Fig. 10)."""
-    cases = [(context.vectors(seconds), context.labels) for seconds in WINDOWS_S]
-    answers = context.workers.map("time window", grid_search, cases)
-    results = dict(zip(WINDOWS_S, answers, strict=True))
-    text = ["As in the paper, each feature is sampled 40 times in every window."]
-    for task in context.labels:
-        at = {seconds: result[task].accuracy for seconds, result in results.items()}
-        text.append(
-            f"{task}: {at[0.8]:.1%} of the decisions are right after 0.8 s, "
-            f"{at[1.2]:.1%} after 1.2 s and {at[2.0]:.1%} after 2 s."
-        )
-    if "category" in context.labels and context.scene is not None:
-        text.append(
-            "In the paper, accuracy falls substantially when the window is shortened "
-            "from 1.2 s to 0.8 s. Physics sets a limit: a movable object cannot be "
-            "distinguished from a fixed one before static friction breaks."
-        )
-    title = "Effect of the time window (Fig. 10)"
-    png = figures.lines(
-        "window",
-        title,
-        WINDOWS_S,
-        by_task(results),
-        label="seconds from first contact",
-    )
-    table = Table("window", "Accuracy at each window", rows("window s", results))
-    return Section(title, text, [table], [png])
 
 
 def scaling(context: Context) -> Section:
@@ -168,18 +97,10 @@ def _compared(
     """
     answers = context.workers.map(column, grid_search, list(cases.values()))
     results = dict(zip(cases, answers, strict=True))
-    theirs = _papers_of(context, table)
-    png = figures.bars(column, title, list(results), by_task(results), marks=theirs)
     heading = f"Accuracy with each choice of {column}"
-    cells = Table(column, heading, rows(column, results, table))
-    return Section(title, [text], [cells], [png])
-
-
-def _papers_of(context: Context, table: str) -> dict[str, dict[str, float]] | None:
-    """The paper's accuracies beside which a simulation of its scene stands."""
-    if context.scene is None:
-        return None
-    return {task: papers(table, task) for task in context.labels}
+    return Section(
+        title, [text], [Table(column, heading, rows(column, results, table))]
+    )
 
 
 def _with_skin(
@@ -194,7 +115,7 @@ def _with_skin(
 
 
 def resolution(context: Context) -> Section:
-    """Accuracy with larger taxels (Table I, Fig. 9)."""
+    """Accuracy with larger taxels (Table I)."""
     data = context.dataset
     labels = context.labels
     recordings = [trial.recording for trial in data.trials]
@@ -205,21 +126,11 @@ def resolution(context: Context) -> Section:
     accuracies, counts = zip(*answers, strict=True)
     results = dict(zip(taxels, accuracies, strict=True))
     without_contact = dict(zip(taxels, counts, strict=True))
-    title = "Effect of taxel resolution (Table I, Fig. 9)"
-    png = figures.lines(
-        "resolution",
-        title,
-        taxels,
-        by_task(results),
-        label="taxels",
-        paper=_papers_of(context, "I"),
-        ticks=list(map(str, taxels)),
-    )
     cells = rows("taxels", results, "I")
     for row in cells:
         row["without contact"] = without_contact[row["taxels"]]
     return Section(
-        title,
+        "Effect of taxel resolution (Table I)",
         [
             "A larger taxel reads the whole force on its area, which is the sum over "
             "the taxels that it replaces. The threshold in newtons stays the same. "
@@ -228,5 +139,4 @@ def resolution(context: Context) -> Section:
             "follows from the joint angles.",
         ],
         [Table("resolution", "Accuracy with larger taxels", cells)],
-        [png],
     )

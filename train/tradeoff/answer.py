@@ -2,12 +2,11 @@
 
 from typing import Any
 
-from train.report.figures import PHONE, STROKES, curve, legend, picture, spread
+from train.report.figures import PANEL, STROKES, curve, legend, picture, spread
 from train.report.score import majority, percent, points, shares
 from train.report.section import Figure, Row, Section, Table
-from train.tradeoff.measured import Measured
-from train.tradeoff.slider import slider
-from train.tradeoff.uses import Use, cheapest, uses
+from train.tradeoff.measured import Measurements
+from train.tradeoff.uses import Use, uses
 
 TITLE_S = (0.6, 1.2)
 """Windows with their accuracy in a panel's title."""
@@ -15,7 +14,7 @@ ACROSS = 3
 """At most so many panels stand side by side."""
 
 
-def answers(measured: Measured, task: str) -> list[Row]:
+def answers(measured: Measurements, task: str) -> list[Row]:
     """The rows of a task's table: fixed windows, early decisions, and guessing."""
     rows: list[Row] = []
     for use in uses(measured, task):
@@ -33,19 +32,16 @@ def commands(use: Use) -> str:
     return ", then ".join(f"`{command}`" for command in use.commands)
 
 
-def section(measured: Measured) -> Section:
-    """The accuracy of each task after each time, as tables, a picture and a slider."""
+def section(measured: Measurements) -> Section:
+    """The accuracy of each task after each time, as tables and a picture."""
     return Section(
         "Accuracy after each time",
-        tables=[
-            Table(f"answer_{t}", t, answers(measured, t), narrow=6) for t in measured.y
-        ],
+        tables=[Table(f"answer_{t}", t, answers(measured, t)) for t in measured.y],
         figures=[picture_of(measured)],
-        widget=slider(measured),
     )
 
 
-def early(measured: Measured) -> Section:
+def early(measured: Measurements) -> Section:
     """Early decisions of each task, compared with waiting for the full window."""
     rows: list[Row] = [
         {
@@ -65,42 +61,14 @@ def early(measured: Measured) -> Section:
             "enough. The mean times are those that the export of all contacts promises; "
             "rates that it does not certify have no row. Exports without a fifth of the "
             "contacts, or of the objects, decide these by its rules. A contact unlike "
-            "all trained ones waits for the full window. A thing that is unknown gets no "
+            "all trained ones waits for the full window. An object that is unknown gets no "
             "name, which counts as wrong.",
         ],
-        [Table("early", "Decisions with a requested error rate", rows, narrow=4)],
+        [Table("early", "Decisions with a requested error rate", rows)],
     )
 
 
-def prices(measured: Measured) -> Section:
-    """The cheapest use, by the price of a wrong decision and of waiting for a
-    second."""
-    rows: list[Row] = []
-    for task in measured.y:
-        best = cheapest(measured, task)
-        low, high = best.result.interval
-        mean = round(best.price(best.result.accuracy, measured), 2)
-        lowest = round(best.price(high, measured), 2)
-        highest = round(best.price(low, measured), 2)
-        row: Row = {"task": task, "best use": best.name, "mean price": mean}
-        row["95 % interval"] = f"{lowest:g} to {highest:g}"
-        row["command"] = commands(best)
-        rows.append(row)
-    command = measured.commands.tradeoff("--cost wrong=10,second=1")
-    return Section(
-        "The price of a wrong decision",
-        [
-            "In this table a wrong decision about a known object "
-            f"costs {measured.wrong:g}, and waiting for a second costs "
-            f"{measured.second:g}. Give your own prices with `{command}`. The best of "
-            "several uses looks a little better than it is, because chance helped to "
-            "choose it."
-        ],
-        [Table("price", "The use with the lowest mean price of a decision", rows)],
-    )
-
-
-def reasons(measured: Measured) -> Section:
+def reasons(measured: Measurements) -> Section:
     """What comes on top of the times, and the commands that export the models."""
     wire = "the time on the skin's wires, which the recordings do not name,"
     if measured.wire_s is not None:
@@ -150,7 +118,7 @@ GLOSSARY = {
         "The accuracy if all trials of an object are held out together."
     ),
     "confidence": (
-        "The calibrated probability that the label is right, if the thing is one of "
+        "The calibrated probability that the label is right, if the object is one of "
         "those in training."
     ),
     "certified": (
@@ -170,15 +138,14 @@ GLOSSARY = {
 }
 
 
-def picture_of(measured: Measured) -> Figure:
+def picture_of(measured: Measurements) -> Figure:
     """Accuracy against time in a panel for each task."""
     m = len(measured.y)
-    wide = m if m <= ACROSS else -(-m // 2)
-    heights = 3.0 * -(-m // wide) + 0.4, 2.6 * m + 0.4
+    across = m if m <= ACROSS else -(-m // 2)
+    down = -(-m // across)
 
-    def draw(canvas: Any, phone: bool) -> None:
-        across = 1 if phone else wide
-        grid = canvas.subplots(-(-m // across), across, squeeze=False, sharey=True)
+    def draw(canvas: Any) -> None:
+        grid = canvas.subplots(down, across, squeeze=False, sharey=True)
         for axes, task in zip(grid.flat, measured.y, strict=False):
             _panel(axes, task, measured)
         for axes in grid.flat[m:]:
@@ -188,13 +155,14 @@ def picture_of(measured: Measured) -> Figure:
         fullest = max(
             grid.flat, key=lambda axes: len(axes.get_legend_handles_labels()[0])
         )
-        legend(canvas, fullest, 2 if phone else 3)
+        legend(canvas, fullest, 3)
 
     title = "Accuracy against the time of the decision, for each task"
-    return picture("tradeoff", title, draw, heights, max(PHONE * wide, PHONE + 2.0))
+    width = max(PANEL * across, PANEL + 2.0)
+    return picture("tradeoff", title, draw, 3.0 * down + 0.4, width)
 
 
-def _panel(axes: Any, task: str, measured: Measured) -> None:
+def _panel(axes: Any, task: str, measured: Measurements) -> None:
     """Draw a task's accuracy after fixed windows and with early decisions."""
     results = measured.results(task)
     chance = 100 * majority(measured.y[task]).accuracy

@@ -8,22 +8,22 @@ from typing import Any
 
 import numpy as np
 
-from edge.touch.features import WINDOW_S
+from edge.features.vector import WINDOW_S
 from edge.touch.layout import SkinLayout
-from train.choose.options import FitOptions, Loaded, features_tried, trials_of
+from train.choose.options import FitOptions
 from train.choose.settings import Chosen
-from train.choose.windows import windows_of
 from train.data.dataset import DataSet, Measurement, Recordings, load_trials
 from train.data.feature_sets import expand
 from train.data.groups import TRIAL
 from train.fitting import fit
 from train.report.score import paired
 from train.report.work import Workers
+from train.tune import Loaded, features_tried, trials_of, windows_of
 
 WINDOWS_S = tuple(round(0.1 * i, 1) for i in range(2, 13))
 """Decision points of the report's early decisions."""
 CHOSEN_S = (0.2, 0.4, 0.6, 0.8, 0.9, 1.0, 1.1, 1.2)
-"""Windows of the report, closer where most things begin to move."""
+"""Windows of the report, closer where most objects begin to move."""
 FIRST_S = (0.6, WINDOW_S)
 """Those that are measured whatever the curve, beside the shortest and the longest."""
 Points = Mapping[float, Mapping[str, Chosen]]
@@ -61,7 +61,7 @@ def followed(
         like: a skin whose thresholds are taken; those of the recordings where None.
     """
     measurement = Measurement(
-        expand([*features_tried(raw, quick=quick), *features]),
+        expand([*features_tried(raw, FitOptions(quick=quick)), *features]),
         WINDOWS_S[-1],
         threshold=None if like is None else like.threshold_counts,
         onset=None if like is None else like.onset,
@@ -123,4 +123,4 @@ def differ(before: Chosen, after: Chosen) -> bool:
 
 def unseen(choice: Chosen) -> float | None:
     """The accuracy on unseen objects; None if no objects could be held out."""
-    return None if choice.left_out == TRIAL else choice.accuracy.accuracy
+    return None if choice.held_out == TRIAL else choice.accuracy.accuracy

@@ -18,17 +18,13 @@ class Commands:
         data: recordings and folders, as they were named.
         touch: one of the recordings.
         out: folder of the report.
-        board: the board file.
         quick: whether the report's choices are quick ones.
-        task: of front.json, where it was named.
     """
 
     data: tuple[str, ...]
     touch: Path
     out: Path
-    board: Path
     quick: bool = False
-    task: str | None = None
 
     def export(self, *options: str) -> str:
         """The command that exports a model of these recordings."""
@@ -46,16 +42,6 @@ class Commands:
         model = shlex.quote(str(self._models / "model.onnx"))
         touch = shlex.quote(str(self.touch))
         return f"{PROGRAM} run --model {model} --error {error:g} --fake {touch}"
-
-    def tradeoff(self, options: str) -> str:
-        """The command that makes this report with other options."""
-        words = ["--data", *self.data]
-        words += ["--board", str(self.board), "--out", str(self.out)]
-        if self.quick:
-            words.append("--quick")
-        if self.task is not None:
-            words += ["--task", self.task]
-        return f"{PROGRAM} tradeoff {shlex.join(words)} {options}"
 
     @property
     def _models(self) -> Path:

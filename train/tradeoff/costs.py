@@ -9,20 +9,20 @@ from typing import Any
 
 import numpy as np
 
-from edge.touch.features import WINDOW_S
+from edge.app.output import counted
+from edge.features.names import feature
+from edge.features.vector import WINDOW_S
 from edge.touch.layout import SkinLayout
-from edge.touch.measures import OF_SHEAR, feature
 from train.choose.settings import Chosen
 from train.data.dataset import DataSet, Recordings
 from train.data.folds import finest, stratified_folds
 from train.data.parts import part
 from train.report.score import paired, points
-from train.report.section import Row, Section, Table, counted
+from train.report.section import Row, Section, Table
 from train.report.skins import coarser
 from train.report.work import Workers
 from train.tradeoff.choices import Points, chosen, followed
-from train.tradeoff.measured import Measured
-from train.tradeoff.wires import fits, microcontroller, spread, wire, wires
+from train.tradeoff.measured import Measurements
 
 WAITS_S = (0.8, 0.6, 0.4)
 EVERY = (2, 4)
@@ -37,7 +37,7 @@ Hits = Mapping[tuple[Path, int], bool]
 
 
 @dataclass(frozen=True)
-class Change:
+class Saving:
     """A change, and the options of the choice made with it.
 
     Attributes:
@@ -56,7 +56,7 @@ class Change:
     fewer: bool = False
 
 
-def changes(raw: Recordings, dataset: DataSet, rate_hz: float) -> list[Change]:
+def changes(raw: Recordings, dataset: DataSet, rate_hz: float) -> list[Saving]:
     """The changes for which a choice is made again; the shorter windows are measured
     anyway.
 
@@ -65,70 +65,44 @@ def changes(raw: Recordings, dataset: DataSet, rate_hz: float) -> list[Change]:
         dataset: their trials.
         rate_hz: frames a second.
     """
-    cases = list(_fewer_frames(raw, dataset.layout, rate_hz))
+    cases = list(_fewer_frames(raw, rate_hz))
     cases += _fewer_taxels(raw, dataset.layout)
     paper = {"features": ["paper"]}
     name = "the paper's features"
-    cases.append(Change(name, "only 3 features", dataset, options=paper))
+    cases.append(Saving(name, "only 3 features", dataset, options=paper))
     if dataset.layout.axes:
-        price = shear_price(dataset.layout)
-        cases.append(Change("no shear", price, without_shear(dataset)))
+        taxels = dataset.layout.rows * dataset.layout.cols
+        price = f"{4 * taxels} bytes a frame fewer"
+        cases.append(Saving("no shear", price, without_shear(dataset)))
     cases += _fewer_trials(dataset)
     return cases
 
 
-def _fewer_frames(
-    raw: Recordings,
-    layout: SkinLayout,
-    rate_hz: float,
-) -> Iterator[Change]:
-    """Every n-th frame, and the wire that then suffices."""
+def _fewer_frames(raw: Recordings, rate_hz: float) -> Iterator[Saving]:
+    """Every n-th frame."""
     for n in EVERY:
         price = f"1/{n} of the bits on the wire"
-        carried = [w.name for w in wires(layout) if w.every(rate_hz) == n]
-        if carried:
-            price = f"{carried[0]} are enough"
         thinned = [part(r, slice(None, None, n)) for r in raw.recordings]
         source = replace(raw, recordings=tuple(thinned))
-        yield Change(f"{rate_hz / n:.0f} frames a second", price, source)
+        yield Saving(f"{rate_hz / n:.0f} frames a second", price, source)
 
 
-def _fewer_taxels(raw: Recordings, layout: SkinLayout) -> Iterator[Change]:
-    """Larger taxels, and the shorter frames that they have on one bus of AD7147, or
-    on a microcontroller where that serves too few taxels."""
-    one_bus = fits(layout, 1)
-    place = "1 bus of AD7147" if one_bus else "a microcontroller"
-
-    def frame_s(skin: SkinLayout) -> float:
-        plain = replace(skin, axes=None)
-        wiring = wire("", spread(plain, 1)) if one_bus else microcontroller(plain)
-        return wiring.frame_s
-
+def _fewer_taxels(raw: Recordings, layout: SkinLayout) -> Iterator[Saving]:
+    """Larger taxels."""
     for skin, recordings in coarser(layout, raw.recordings):
-        saved = 1e3 * (frame_s(layout) - frame_s(skin))
-        price = f"a frame is {saved:.1f} ms shorter on {place}"
-        name = counted(skin.rows * skin.cols, "taxel")
-        yield Change(name, price, replace(raw, recordings=tuple(recordings)))
+        taxels = skin.rows * skin.cols
+        price = f"{taxels} of {layout.rows * layout.cols} taxels to read"
+        source = replace(raw, recordings=tuple(recordings))
+        yield Saving(counted(taxels, "taxel"), price, source)
 
 
 def without_shear(dataset: DataSet) -> DataSet:
     """The same trials without the features of shear."""
-    names = [name for name in dataset.names if feature(name).quantity not in OF_SHEAR]
+    names = [name for name in dataset.names if not feature(name).quantity.shear]
     return dataset.of(names)
 
 
-def shear_price(layout: SkinLayout) -> str:
-    """What three axes cost on the wire."""
-    all_axes = microcontroller(layout)
-    normal_only = microcontroller(replace(layout, axes=None))
-    return (
-        f"{layout.rows * layout.cols * 4} bytes a frame fewer: "
-        f"{1.0 / normal_only.frame_s:.0f} frames a second on one bus at 1 MHz instead of "
-        f"{1.0 / all_axes.frame_s:.0f}"
-    )
-
-
-def _fewer_trials(dataset: DataSet) -> Iterator[Change]:
+def _fewer_trials(dataset: DataSet) -> Iterator[Saving]:
     """A part of the trials, as far as it suffices for a choice."""
     y = {task: dataset.labels(task) for task in dataset.tasks}
     count = len(dataset.trials)
@@ -137,7 +111,7 @@ def _fewer_trials(dataset: DataSet) -> Iterator[Change]:
         remaining = len(sample.trials)
         if remaining >= FEWEST:
             price = f"{counted(count - remaining, 'recording')} fewer"
-            yield Change(f"{remaining} of {count} trials", price, sample, fewer=True)
+            yield Saving(f"{remaining} of {count} trials", price, sample, fewer=True)
 
 
 def hits(dataset: DataSet, choices: Mapping[str, Chosen]) -> dict[str, Hits]:
@@ -154,7 +128,7 @@ def hits(dataset: DataSet, choices: Mapping[str, Chosen]) -> dict[str, Hits]:
     return of_tasks
 
 
-def answered(change: Change, like: SkinLayout) -> tuple[dict[str, Hits], float]:
+def answered(change: Saving, like: SkinLayout) -> tuple[dict[str, Hits], float]:
     """{task: hits of the choice made with a change}, and the seconds of one core that
     it took.
 
@@ -205,16 +179,16 @@ def measure(
     full = hits(dataset, windows[WINDOW_S])
     rows = []
     for w in filter(windows.__contains__, WAITS_S):
-        wait = Change(f"waiting {w:g} s", f"{WINDOW_S - w:.1f} s sooner", dataset)
+        wait = Saving(f"waiting {w:g} s", f"{WINDOW_S - w:.1f} s sooner", dataset)
         rows.append(row_of(wait, full, hits(dataset, windows[w]), 0.0))
-    thorough = Change(
+    thorough = Saving(
         "all candidates", "longer training", raw, options={"quick": False}
     )
     cases = changes(raw, dataset, rate_hz)
     if quick:
         # The longest first: it runs beside the others.
         cases.insert(0, thorough)
-    unchanged = Change("the quick choice", "", dataset)
+    unchanged = Saving("the quick choice", "", dataset)
     jobs = [(case, dataset.layout) for case in (unchanged, *cases)]
     (base, _), *afters = workers.map("costs", answered, jobs)
     if not quick:
@@ -225,7 +199,7 @@ def measure(
 
 
 def row_of(
-    case: Change,
+    case: Saving,
     base: Mapping[str, Hits],
     after: Mapping[str, Hits],
     seconds: float,
@@ -241,13 +215,13 @@ def row_of(
     return row
 
 
-def section(measured: Measured) -> Section:
+def section(measured: Measurements) -> Section:
     """A row for each change."""
     title = "Accuracy gained or lost by each change"
     return Section(
         "Savings, and the accuracy that they cost",
         [
-            f"Each row changes one thing of the choice at {WINDOW_S:g} s: a shorter wait "
+            f"Each row changes one setting of the choice at {WINDOW_S:g} s: a shorter wait "
             "of the choice above, everything else of the quick choice, which is made "
             "again with the features that suit the change. A larger taxel reads the sum "
             "of the forces on its area. The last section explains points and intervals.",
@@ -258,7 +232,6 @@ def section(measured: Measured) -> Section:
                 title,
                 measured.costs,
                 timed=(TIME,),
-                narrow=1 + len(measured.y),
             )
         ],
     )

@@ -14,12 +14,12 @@ import numpy as np
 from edge.arrays import Booleans, Integers
 from edge.decide.early import fastest
 from edge.decide.info import Stopping
-from train.choose.evaluate import Promise, Result
+from train.choose.evaluate import NestedAccuracy, Result
 from train.data.dataset import DataSet
 from train.data.folds import finest, stratified_folds
 from train.data.groups import LEAVE_OUT, TRIAL, groups_of
 from train.fitting import fit
-from train.model.rules import Course, candidates
+from train.model.rules import TimeSeries, candidates
 from train.report.score import paired
 from train.report.work import Workers
 
@@ -28,17 +28,17 @@ ERRORS = (0.05, 0.1, 0.15, 0.2, 0.25, 0.3)
 
 
 @dataclass(frozen=True)
-class Certified:
+class EarlyDecisions:
     """Decisions with an error rate that an export certifies.
 
     Attributes:
         error: the requested rate.
         mean_s: mean time to decision, which the exported model promises.
         right: (n,) whether each contact is decided rightly by a model without it. A
-            thing that is unknown gets no name, which counts as wrong.
+            object that is unknown gets no name, which counts as wrong.
         waited: (n,) whether the same contact is decided rightly at the full window.
         unseen: (m,) whether each contact is decided rightly by a model without its
-            object; None where no objects could be left out.
+            object; None where no objects could be held out.
     """
 
     error: float
@@ -50,7 +50,7 @@ class Certified:
     @property
     def result(self) -> Result:
         """The accuracy."""
-        return Promise(int(self.right.sum()), len(self.right))
+        return NestedAccuracy(int(self.right.sum()), len(self.right))
 
     @property
     def gain(self) -> tuple[float, float, float]:
@@ -59,20 +59,13 @@ class Certified:
         return paired(self.waited, self.right)
 
 
-def soonest(rules: Sequence[Certified], level: float) -> Certified | None:
-    """The decisions of an accuracy with the shortest mean time; None where none have
-    it."""
-    able = [rule for rule in rules if rule.result.accuracy >= level]
-    return min(able, key=lambda rule: rule.mean_s, default=None)
-
-
 def certified(
     dataset: DataSet,
     decision_points_s: Sequence[float],
     *,
     quick: bool = True,
     jobs: int = 1,
-) -> dict[str, list[Certified]]:
+) -> dict[str, list[EarlyDecisions]]:
     """{task: its decisions at each error rate that an export certifies}.
 
     Args:
@@ -91,11 +84,11 @@ def certified(
     model = fit(dataset, **options, jobs=jobs).sequential
     assert model is not None
     folds = stratified_folds(y[finest(y)], FOLDS)
-    known = left_out(dataset, folds, options, jobs)
-    unseen: dict[str, LeftOut] = {}
+    known = held_out_decisions(dataset, folds, options, jobs)
+    unseen: dict[str, HeldOutDecisions] = {}
     groups = groups_of(dataset, y, LEAVE_OUT, quick=True)
     if groups is not None:
-        by_task = left_out(dataset, groups.folds, options, jobs)
+        by_task = held_out_decisions(dataset, groups.folds, options, jobs)
         unseen = {task: by_task[task] for task in groups.tasks}
     return {
         task: at_errors(stopping, known[task], unseen.get(task))
@@ -104,21 +97,21 @@ def certified(
 
 
 @dataclass(frozen=True)
-class LeftOut:
+class HeldOutDecisions:
     """A task's decisions by models that were fitted without what they decide.
 
     Attributes:
         right: (decision points, n) whether each fixed window's label is right.
-        course: the same with confidences, which tell when a rule decides.
+        time_series: the same with confidences, which tell when a rule decides.
     """
 
     right: Booleans
-    course: Course
+    time_series: TimeSeries
 
 
-def left_out(
+def held_out_decisions(
     dataset: DataSet, folds: Integers, options: Mapping[str, Any], jobs: int
-) -> dict[str, LeftOut]:
+) -> dict[str, HeldOutDecisions]:
     """{task: decisions of the trials of each fold (n,) by an export of the others}.
 
     Args:
@@ -136,7 +129,7 @@ def left_out(
 
 def _without(
     dataset: DataSet, test: Booleans, options: Mapping[str, Any]
-) -> dict[str, LeftOut]:
+) -> dict[str, HeldOutDecisions]:
     """{task: the decisions of some trials by an export of the others}."""
     fitted = fit(dataset.part(~test), **options, jobs=1)
     model = fitted.sequential
@@ -146,47 +139,54 @@ def _without(
     points = model.decision_points_s
     new = np.stack([test_set.features(s, fitted.samples, names) for s in points])
     truth = {task: test_set.labels(task) for task in model.choices}
-    right, _, courses = model.judged(new, truth)
-    return {task: LeftOut(right[task], course) for task, course in courses.items()}
+    right, _, series = model.judged(new, truth)
+    return {
+        task: HeldOutDecisions(right[task], time_series)
+        for task, time_series in series.items()
+    }
 
 
-def _joined(folds: Sequence[LeftOut]) -> LeftOut:
+def _joined(folds: Sequence[HeldOutDecisions]) -> HeldOutDecisions:
     """The decisions of several folds together."""
-    courses = [fold.course for fold in folds]
-    confidences = zip(*(course.confidences for course in courses), strict=True)
-    wrong = zip(*(course.wrong for course in courses), strict=True)
-    withheld = [course.withheld for course in courses if course.withheld is not None]
-    course = Course(
+    series = [fold.time_series for fold in folds]
+    confidences = zip(*(time_series.confidences for time_series in series), strict=True)
+    wrong = zip(*(time_series.wrong for time_series in series), strict=True)
+    withheld = [
+        time_series.withheld
+        for time_series in series
+        if time_series.withheld is not None
+    ]
+    time_series = TimeSeries(
         confidences=list(map(np.hstack, confidences)),
         wrong=list(map(np.hstack, wrong)),
-        unusual=np.hstack([course.unusual for course in courses]),
+        unusual=np.hstack([time_series.unusual for time_series in series]),
         withheld=np.hstack(withheld) if withheld else None,
     )
-    return LeftOut(np.hstack([fold.right for fold in folds]), course)
+    return HeldOutDecisions(np.hstack([fold.right for fold in folds]), time_series)
 
 
 def at_errors(
-    stopping: Stopping, known: LeftOut, unseen: LeftOut | None = None
-) -> list[Certified]:
+    stopping: Stopping, known: HeldOutDecisions, unseen: HeldOutDecisions | None = None
+) -> list[EarlyDecisions]:
     """The decisions at each error rate that a model certifies; one rule that serves
     several rates stands at the smallest.
 
     Args:
         stopping: the model's rules.
         known: decisions of known objects.
-        unseen: those of objects that were left out.
+        unseen: those of objects that were held out.
     """
     waiting, _ = candidates(len(known.right))
-    _, late = known.course.under(waiting)
+    _, late = known.time_series.under(waiting)
     rules = {fastest(stopping, error): error for error in reversed(ERRORS)}
     decisions = []
     for rule, error in reversed(rules.items()):
         if rule is None:
             continue
-        _, wrong = known.course.under(rule)
+        _, wrong = known.time_series.under(rule)
         right = None
         if unseen is not None:
-            _, missed = unseen.course.under(rule)
+            _, missed = unseen.time_series.under(rule)
             right = ~missed
-        decisions.append(Certified(error, rule.mean_s, ~wrong, ~late, right))
+        decisions.append(EarlyDecisions(error, rule.mean_s, ~wrong, ~late, right))
     return decisions

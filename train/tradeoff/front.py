@@ -24,7 +24,7 @@ class OperatingPoint:
 
     Attributes:
         window_s: seconds from onset that a decision waits for.
-        accuracy: nested accuracy of the entire choice on left-out trials, 0 to 1.
+        accuracy: nested accuracy of the entire choice on held-out trials, 0 to 1.
         low, high: 95 % interval of the exported model's accuracy.
     """
 

@@ -9,11 +9,11 @@ from train.report.section import Row
 from train.tradeoff.board import Board
 from train.tradeoff.choices import Points
 from train.tradeoff.commands import Commands
-from train.tradeoff.early import Certified
+from train.tradeoff.early import EarlyDecisions
 
 
 @dataclass(frozen=True)
-class Measured:
+class Measurements:
     """Accuracies and times of one data set on one board.
 
     Attributes:
@@ -27,21 +27,17 @@ class Measured:
             (`costs.measure`).
         commands: that make these models.
         notes: sentences of the choice.
-        wrong, second: an owner's price of a wrong decision, and of waiting for a
-            second.
     """
 
     y: Labels
     board: Board
     wire_s: float | None
     points: Points
-    certified: Mapping[str, Sequence[Certified]]
+    certified: Mapping[str, Sequence[EarlyDecisions]]
     costs: Sequence[Row]
     commands: Commands
     notes: Sequence[str] = ()
-    wrong: float = 10.0
-    second: float = 1.0
 
     def results(self, task: str) -> dict[float, Result]:
-        """{window: accuracy of a task on left-out trials}."""
+        """{window: accuracy of a task on held-out trials}."""
         return {window: tasks[task].by_trial for window, tasks in self.points.items()}

@@ -8,25 +8,24 @@ from pathlib import Path
 
 import numpy as np
 
+from edge.app.output import counted
 from edge.errors import InputError
 from edge.record.recording import Recording
 from edge.writing import write_whole
 from train.data.dataset import DataSet, read
 from train.report.page import write
-from train.report.section import Section, counted
+from train.report.section import Section
 from train.report.work import Workers
 from train.tradeoff import answer, costs, early
 from train.tradeoff import board as boards
 from train.tradeoff.choices import WINDOWS_S, choices_at, prepared
 from train.tradeoff.commands import Commands
 from train.tradeoff.front import ParetoFront
-from train.tradeoff.measured import Measured
-from train.tradeoff.wires import wire_time_s
+from train.tradeoff.measured import Measurements
 
-SECTIONS: tuple[Callable[[Measured], Section], ...] = (
+SECTIONS: tuple[Callable[[Measurements], Section], ...] = (
     answer.section,
     costs.section,
-    answer.prices,
     answer.reasons,
     answer.early,
     lambda measured: boards.section(measured.board),
@@ -55,15 +54,11 @@ class Options:
 
     Attributes:
         task: of front.json; by default `category`, or else the first.
-        wrong, second: an owner's price of a wrong decision, and of waiting for a
-            second.
         quick: make quick choices.
         jobs: processes.
     """
 
     task: str | None = None
-    wrong: float = 10.0
-    second: float = 1.0
     quick: bool = False
     jobs: int = 1
 
@@ -98,22 +93,18 @@ def tradeoff(data: Sequence[str], out: Path, board_path: str, options: Options) 
     certified = early.certified(dataset, WINDOWS_S, quick=quick, jobs=options.jobs)
     rows = costs.measure(raw, dataset, points, rate, workers, quick=quick)
     order = sorted(dataset.tasks, key=lambda task: (task != main, task))
-    measured = Measured(
+    measured = Measurements(
         y={task: dataset.labels(task) for task in order},
         board=board,
-        wire_s=wire_time_s(raw.recordings, dataset.layout, rate),
+        wire_s=_wire_time_s(raw.recordings, rate),
         points=points,
         certified=certified,
         costs=rows,
-        wrong=options.wrong,
-        second=options.second,
         commands=Commands(
             data=tuple(map(str, data)),
             touch=raw.paths[0],
             out=out,
             quick=quick,
-            board=Path(board_path),
-            task=options.task,
         ),
         notes=ready.notes,
     )
@@ -131,6 +122,15 @@ def _rate_hz(recordings: Sequence[Recording]) -> float:
     return float(np.median([1.0 / step_s for step_s in steps_s if step_s > 0.0]))
 
 
+def _wire_time_s(recordings: Sequence[Recording], rate_hz: float) -> float | None:
+    """Seconds from the end of a window until its last frame is read: half a frame's
+    period until it begins, and its time on the skin's wires, where
+    `edge-classify record` stored that (`meta.wire_s`)."""
+    stored = [recording.meta.get("wire_s") for recording in recordings]
+    times = [wire_s for wire_s in stored if isinstance(wire_s, int | float)]
+    return 0.5 / rate_hz + max(times) if times else None
+
+
 def _main_task(dataset: DataSet, task: str | None) -> str:
     """The task of front.json.
 
@@ -145,7 +145,7 @@ def _main_task(dataset: DataSet, task: str | None) -> str:
     return main
 
 
-def _write(measured: Measured, out: Path, contacts: str) -> Path:
+def _write(measured: Measurements, out: Path, contacts: str) -> Path:
     """Write the report on so many contacts."""
     lead = [
         "How long must a robot wait before it knows what its arm has touched? This "

@@ -4,8 +4,8 @@ from dataclasses import dataclass
 
 from train.choose.evaluate import Result
 from train.tradeoff.choices import WINDOWS_S, unseen
-from train.tradeoff.early import Certified
-from train.tradeoff.measured import Measured
+from train.tradeoff.early import EarlyDecisions
+from train.tradeoff.measured import Measurements
 
 EARLY = (
     "--leave-out trial",
@@ -16,7 +16,7 @@ EARLY = (
 
 @dataclass(frozen=True)
 class Use:
-    """A way to use a task, and its price.
+    """A way to use a task.
 
     Attributes:
         name: of the way.
@@ -32,12 +32,8 @@ class Use:
     unseen: float | None
     commands: tuple[str, ...]
 
-    def price(self, accuracy: float, measured: Measured) -> float:
-        """The mean price of a decision at an accuracy."""
-        return measured.wrong * (1.0 - accuracy) + measured.second * self.seconds
 
-
-def fixed(measured: Measured, task: str, window_s: float) -> Use:
+def fixed(measured: Measurements, task: str, window_s: float) -> Use:
     """The decision of a task after a fixed window."""
     choice = measured.points[window_s][task]
     return Use(
@@ -49,7 +45,7 @@ def fixed(measured: Measured, task: str, window_s: float) -> Use:
     )
 
 
-def early(measured: Measured, rule: Certified) -> Use:
+def early(measured: Measurements, rule: EarlyDecisions) -> Use:
     """The early decision with an error rate."""
     return Use(
         f"early, at most {rule.error:.0%} wrong",
@@ -60,15 +56,8 @@ def early(measured: Measured, rule: Certified) -> Use:
     )
 
 
-def uses(measured: Measured, task: str) -> list[Use]:
+def uses(measured: Measurements, task: str) -> list[Use]:
     """Every fixed window and every early decision of a task, on the same contacts."""
     windows = [fixed(measured, task, window) for window in measured.results(task)]
     rules = measured.certified[task]
     return [*windows, *(early(measured, rule) for rule in rules)]
-
-
-def cheapest(measured: Measured, task: str) -> Use:
-    """The use of a task with the lowest mean price of a decision."""
-    return min(
-        uses(measured, task), key=lambda use: use.price(use.result.accuracy, measured)
-    )

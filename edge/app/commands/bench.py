@@ -28,8 +28,8 @@ from edge.decide.classifier import Classifier
 from edge.decide.model import Model
 from edge.errors import InputError
 from edge.record.recording import Recording
-from edge.touch.first_contact import first_contact
 from edge.touch.frame import Frame
+from edge.touch.track import first_contact
 from edge.writing import check_writable, write_whole
 
 RATE_HZ = 100.0

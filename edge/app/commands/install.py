@@ -22,7 +22,7 @@ from edge.decide.model import LARGEST_BYTES, Model
 from edge.decide.verify import golden_of, verify
 from edge.errors import EdgeError, InputError
 from edge.files import read_bytes, refusing
-from edge.touch.differences import differences
+from edge.touch.layout import differences
 from edge.wire.skin.file import load
 from edge.writing import lock, remove_leftovers, write_whole
 

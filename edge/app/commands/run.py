@@ -100,7 +100,7 @@ def run(arguments: argparse.Namespace) -> int:
     ) as live:
         if live.skin.layout != model.info.layout:
             # A skin often is the model's.
-            from edge.touch.differences import differences
+            from edge.touch.layout import differences
 
             for sentence in differences(model.info.layout, live.skin.layout):
                 LOG.warning(f"{arguments.model}: {sentence}")

@@ -29,10 +29,9 @@ from edge.decide.classifier import Classifier
 from edge.decide.events import Event, Onset
 from edge.decide.model import Model
 from edge.errors import InputError
-from edge.touch.active import Region
 from edge.touch.frame import Frame
 from edge.touch.layout import SkinLayout
-from edge.touch.region import find_regions
+from edge.touch.region import Region, find_regions
 
 Colours = Bytes
 """Numbers in the 256-colour palette."""

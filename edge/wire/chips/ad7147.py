@@ -5,14 +5,14 @@ Registers have 16 bits behind a 16-bit pointer, both big-endian, with auto-incre
 Linux's driver ad714x.
 """
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from itertools import cycle
 
 import numpy as np
 
 from edge.arrays import Bytes
-from edge.wire.bus.protocol import Bus, fetch, read, send, write
-from edge.wire.chips.chip import Chip, ChipSpec, Defaults, Parsed, Traits
+from edge.wire.bus.protocol import Bus, read, write
+from edge.wire.chips.chip import Chip, ChipSpec, Defaults, Parsed, Script, Step, Traits
 
 STAGES = 12
 FRAME_BYTES = 2 * STAGES + 2
@@ -83,6 +83,32 @@ def words(values: tuple[int, ...]) -> bytes:
     return np.array(values, ">u2").tobytes()
 
 
+CHECKS = [
+    Step(
+        words((register,)),
+        words(values),
+        problem=f"register {register:#04x} of the AD7147 does not keep what is written",
+    )
+    for register, values in CHECK_ROWS
+]
+SCRIPT = Script(
+    Step(
+        words((DEVICE_ID,)),
+        words((IDENTITY << 4,)),
+        words((0xFFF0,)),
+        "not an AD7147: its identity reads {:#06x}, not 0x147x",
+    ),
+    CHECKS,
+    [
+        *(Step(words((register, *values))) for register, values in START_ROWS),
+        Step(words((STATUS,)), bytes(6), bytes(6)),
+        *CHECKS,
+    ],
+)
+"""All rows are written, the status registers read, which clears them, and the rows read
+back."""
+
+
 class AD7147(Chip):
     """One AD7147-1.
 
@@ -95,6 +121,7 @@ class AD7147(Chip):
     stages = STAGES
     # The middle half of the converter's range (AD7147 data sheet).
     usual_rest = (0x4000, 0xC000)
+    fixed = SCRIPT
     frame_pointer = words((RESULTS,))
 
     def __init__(
@@ -119,17 +146,6 @@ class AD7147(Chip):
         results = read(address, self.frame.buffer[:-2])
         bare = bus.prepare(write(address, self.frame_pointer), results)
         self._frames = cycle([self.frame] + [bare] * (IDENTIFIED_EVERY - 1))
-        checks = []
-        for register, values in CHECK_ROWS:
-            pointer = write(address, words((register,)))
-            row = read(address, 2 * len(values))
-            checks.append((words(values), bus.prepare(pointer, row)))
-        self._checks = cycle(checks)
-        identity = int.from_bytes(fetch(bus, address, words((DEVICE_ID,)), 2), "big")
-        if identity >> 4 != IDENTITY:
-            raise self.wrong(
-                f"not an AD7147: its identity reads {identity:#06x}, not 0x147x"
-            )
 
     @staticmethod
     def traits(taxels: int, options: Mapping[str, int]) -> Traits:
@@ -160,32 +176,6 @@ class AD7147(Chip):
             driven = np.flatnonzero(data[row, :-2] != 0xFF)
             intact[row, (int(driven[-1]) + 1 if driven.size else 0) // 2 :] = False
         return values, intact
-
-    def settings(self) -> Iterator[None]:
-        """Write all rows, read the status registers, which clears them, and read the
-        rows back.
-
-        Raises:
-            WrongChip: a register does not hold what was written.
-            BusError: a transaction failed.
-        """
-        for register, values in START_ROWS:
-            send(self.bus, self.address, words((register, *values)))
-            yield
-        fetch(self.bus, self.address, words((STATUS,)), 6)
-        yield
-        for register, _ in CHECK_ROWS:
-            if not self.healthy():
-                place = f"register {register:#04x} of the AD7147"
-                raise self.wrong(f"{place} does not keep what is written")
-            yield
-
-    def healthy(self) -> bool:
-        """Whether the next row of `CHECK_ROWS`, each in turn, holds what was
-        written."""
-        expected, prepared = next(self._checks)
-        self.bus.transfer(prepared)
-        return prepared.buffer.tobytes() == expected
 
     def read(self) -> None:
         """Read all taxels, now and then with the identity, and once more where the last

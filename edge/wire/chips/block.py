@@ -17,7 +17,16 @@ import numpy as np
 from edge.arrays import Bytes, Counts
 from edge.wire.bus.crc import crc16, sealed
 from edge.wire.bus.protocol import Bus, BusFault, Transfer, read, write
-from edge.wire.chips.chip import Chip, ChipSpec, Defaults, Option, Parsed, Traits
+from edge.wire.chips.chip import (
+    Chip,
+    ChipSpec,
+    Defaults,
+    Option,
+    Parsed,
+    Script,
+    Step,
+    Traits,
+)
 
 IDENTITY = b"\x00"
 FRAME = b"\x10"
@@ -114,19 +123,22 @@ class Block(Chip):
             BusError: it does not answer.
         """
         size = 4 + data_bytes(self.axes * taxels, bits)
-        super().__init__(bus, address, into=size if into is None else into)
-        self._expected = identity(taxels, bits | self.flags)
-        self._identity = bus.prepare(write(address, IDENTITY), read(address, 10))
-        if self.healthy():
-            return
-        served = self._identity.buffer.tobytes()
-        raise self.wrong(f"serves {described(served)}, not {described(self._expected)}")
+        script = self.script(taxels, {"bits": bits})
+        super().__init__(
+            bus, address, into=size if into is None else into, script=script
+        )
 
     @classmethod
     def of(cls, bus: Bus, spec: ChipSpec, into: Bytes) -> Self:
         """The driver of a skin's chip, which reads frames into these bytes."""
         bits = spec.option("bits")
         return cls(bus, spec.address, taxels=len(spec.taxels), bits=bits, into=into)
+
+    @classmethod
+    def script(cls, taxels: int, options: Mapping[str, int]) -> Script:
+        """There are no settings; the identity tells what it serves."""
+        step = Step(IDENTITY, identity(taxels, options["bits"] | cls.flags))
+        return Script(step, [step])
 
     @staticmethod
     def traits(taxels: int, options: Mapping[str, int]) -> Traits:
@@ -151,10 +163,16 @@ class Block(Chip):
         values = unpack(data[:, 2:-2], len(spec.taxels), spec.option("bits"))
         return values, np.ones(values.shape, np.bool_)
 
-    def healthy(self) -> bool:
-        """Whether its identity is still the same."""
-        self._receive(self._identity)
-        return self._identity.buffer.tobytes() == self._expected
+    def ask(self, step: Step) -> bytes:
+        """The register at a pointer, whose CRC is right."""
+        pointer = write(self.address, step.out)
+        transfer = self.bus.prepare(pointer, read(self.address, len(step.answer)))
+        self._receive(transfer)
+        return transfer.buffer.tobytes()
+
+    def problem(self, step: Step, answer: bytes) -> str:
+        """What it serves, and what it should."""
+        return f"serves {described(answer)}, not {described(step.answer)}"
 
     def read(self) -> None:
         """Read all taxels.

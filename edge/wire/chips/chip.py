@@ -7,13 +7,14 @@ fake bus (`edge.wire.fake.bus.FakeChip`), and enter both in the list of `edge.wi
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import ClassVar, Self
+from itertools import cycle
+from typing import ClassVar, NamedTuple, Self
 
 from edge.arrays import Booleans, Bytes, Counts
-from edge.wire.bus.protocol import Bus, BusError, read, write
+from edge.wire.bus.protocol import Bus, BusError, fetch, read, send, write
 
 ADDRESSES = range(0x08, 0x78)
 """7-bit addresses that are not reserved (I2C specification, section 3.1.12)."""
@@ -27,6 +28,44 @@ Parsed = tuple[Counts, Booleans]
 
 class WrongChip(BusError, LookupError):
     """The chip at the address is not the one that the skin file names."""
+
+
+class Step(NamedTuple):
+    """A transaction of a set-up, and the answer that a chip gives.
+
+    Attributes:
+        out: bytes to write.
+        answer: bytes to read, as they should be; none where nothing is read.
+        bits: the bits of the answer that count; all where empty.
+        problem: what another answer tells, with a place for its number.
+        wait_s: time to wait afterwards.
+    """
+
+    out: bytes
+    answer: bytes = b""
+    bits: bytes = b""
+    problem: str = ""
+    wait_s: float = 0.0
+
+    def suits(self, answer: bytes) -> bool:
+        """Whether an answer is as it should be."""
+        bits = self.bits or bytes([0xFF]) * len(answer)
+        return not any(map(lambda a, b, c: (a ^ b) & c, answer, self.answer, bits))
+
+
+class Script(NamedTuple):
+    """The transactions by which a chip is identified, set up and looked at.
+
+    Attributes:
+        identify: tells what chip it is, before anything is written.
+        checks: each in turn tells whether the chip still has its settings.
+        settings: write the settings and read them back. The last one reads a register
+            that a reset changes, so that a chip that resets meanwhile does not pass.
+    """
+
+    identify: Step
+    checks: Sequence[Step]
+    settings: Sequence[Step] = ()
 
 
 @dataclass(frozen=True)
@@ -77,15 +116,15 @@ class Option:
 class Chip(ABC):
     """A driver of one chip.
 
-    The constructor sends only the reads that identify the chip. `settings` configures
-    it in steps of one transaction each, so that a chip can be set up between two
-    frames.
+    The constructor identifies the chip. `settings` configures it in steps of one
+    transaction each, so that a chip can be set up between two frames.
 
     Attributes:
         name: the value of `kind` in a skin file.
         addresses: addresses that the chip can have.
         stages: number of its stages; None where the skin file decides, up to
             `MOST_TAXELS`.
+        fixed: the script of a kind that has the same for all taxels and options.
         frame_pointer: pointer of the register where the taxels begin.
         options: keys of a skin file that only this kind has.
         unchanged_frames: readings with the same bytes after which the chip hangs for
@@ -103,6 +142,7 @@ class Chip(ABC):
     name: ClassVar[str]
     addresses: ClassVar[range] = ADDRESSES
     stages: ClassVar[int | None] = None
+    fixed: ClassVar[Script]
     frame_pointer: ClassVar[bytes]
     options: ClassVar[Mapping[str, Option]] = {}
     unchanged_frames: ClassVar[int | None] = None
@@ -116,16 +156,32 @@ class Chip(ABC):
         address: int,
         *,
         into: Bytes | int,
+        script: Script | None = None,
     ) -> None:
+        """Identify the chip.
+
+        Raises:
+            WrongChip: it is another one.
+            BusError: it does not answer.
+        """
         self.bus = bus
         self.address = address
         pointer = write(address, self.frame_pointer)
         self.frame = bus.prepare(pointer, read(address, into))
+        script = script or self.fixed
+        self._settings = script.settings
+        self._checks = cycle(script.checks)
+        self.take(script.identify)
 
     @classmethod
     def of(cls, bus: Bus, spec: ChipSpec, into: Bytes) -> Self:
         """The driver of a skin's chip, which reads frames into these bytes."""
         return cls(bus, spec.address, into=into)
+
+    @classmethod
+    def script(cls, taxels: int, options: Mapping[str, int]) -> Script:
+        """The script with a number of taxels and the values of its options."""
+        return cls.fixed
 
     @staticmethod
     @abstractmethod
@@ -143,24 +199,51 @@ class Chip(ABC):
         """
 
     def settings(self) -> Iterator[None]:
-        """Write the settings and read them back, one transaction a step.
-
-        The last step reads a register that a reset changes, so that a chip that resets
-        during set-up does not pass. A chip without settings has no steps.
+        """Set the chip up, one transaction a step.
 
         Raises:
             BusError: a transaction failed, or a register does not hold what was
                 written.
         """
-        return iter(())
+        for step in self._settings:
+            self.take(step)
+            yield
 
-    @abstractmethod
-    def healthy(self) -> bool:
-        """Whether the chip still has its settings: one short read.
+    def take(self, step: Step) -> None:
+        """Send a step of the script.
+
+        Raises:
+            WrongChip: the answer is another one.
+            BusError: the transaction failed.
+        """
+        if not step.answer:
+            send(self.bus, self.address, step.out)
+            self.bus.sleep(step.wait_s)
+            return
+        answer = self.ask(step)
+        if not step.suits(answer):
+            raise self.wrong(self.problem(step, answer))
+
+    def ask(self, step: Step) -> bytes:
+        """The answer to a step that reads.
 
         Raises:
             BusError: the transaction failed.
         """
+        return fetch(self.bus, self.address, step.out, len(step.answer))
+
+    def problem(self, step: Step, answer: bytes) -> str:
+        """What an unsuitable answer tells."""
+        return step.problem.format(int.from_bytes(answer, "big"))
+
+    def healthy(self) -> bool:
+        """Whether the chip still has its settings: the next of its checks.
+
+        Raises:
+            BusError: the transaction failed.
+        """
+        step = next(self._checks)
+        return step.suits(self.ask(step))
 
     def read(self) -> None:
         """Read all taxels into the buffer of `frame`.
@@ -213,8 +296,17 @@ class ChipSpec:
         way = "" if self.mux is None else f"mux {self.mux:#04x} channel {self.channel} "
         return f"{way}address {self.address:#04x}"
 
+    @property
+    def _arguments(self) -> tuple[int, dict[str, int]]:
+        """The number of taxels, and the values of all options."""
+        return len(self.taxels), {name: self.option(name) for name in self.kind.options}
+
     @cached_property
     def traits(self) -> Traits:
         """The traits of the chip."""
-        options = {name: self.option(name) for name in self.kind.options}
-        return self.kind.traits(len(self.taxels), options)
+        return self.kind.traits(*self._arguments)
+
+    @property
+    def script(self) -> Script:
+        """The script of the chip."""
+        return self.kind.script(*self._arguments)

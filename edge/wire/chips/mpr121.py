@@ -5,13 +5,13 @@ only while the chip is stopped (MPR121 data sheet; application note AN3944 for t
 filter).
 """
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 
 import numpy as np
 
 from edge.arrays import Bytes
-from edge.wire.bus.protocol import Bus, fetch, read, send, write
-from edge.wire.chips.chip import Chip, ChipSpec, Defaults, Parsed, Traits
+from edge.wire.bus.protocol import Bus
+from edge.wire.chips.chip import Chip, ChipSpec, Defaults, Parsed, Script, Step, Traits
 
 ELECTRODES = 12
 TOUCH_HIGH = 0x01
@@ -41,6 +41,46 @@ baseline filter; charge current 16 uA, charge time 0.5 us and 4 samples each 1 m
 SET_CONFIG2 = SETTINGS[-1][1][1]
 
 
+def check(register: int, values: tuple[int, ...], otherwise: str) -> Step:
+    """A step that reads registers back."""
+    problem = f"register {register:#04x} of the MPR121 {otherwise}"
+    return Step(bytes([register]), bytes(values), problem=problem)
+
+
+RUNS = Step(
+    bytes([CONFIG2]),
+    bytes([SET_CONFIG2, RUNNING]),
+    problem="loses its settings; check its power",
+)
+"""CONFIG2 and ECR are as they were set; a reset changes both, over-current ECR."""
+SCRIPT = Script(
+    Step(
+        bytes([CONFIG2]),
+        bytes([SET_CONFIG2]),
+        bytes([0xFF ^ SET_CONFIG2 ^ RESET_CONFIG2]),
+        "not an MPR121: register 0x5d reads {:#04x}, not 0x24 or 0x20",
+    ),
+    [RUNS],
+    [
+        Step(bytes([RESET, RESET_KEY]), wait_s=RESET_WAIT_S),
+        Step(bytes([ECR, 0])),
+        check(CONFIG2, (RESET_CONFIG2,), "does not come out of reset"),
+        *(Step(bytes([register, *values])) for register, values in SETTINGS),
+        *(check(*row, "does not keep what is written") for row in SETTINGS),
+        Step(bytes([ECR, RUNNING])),
+        Step(
+            bytes([TOUCH_HIGH]),
+            b"\0",
+            bytes([OVER_CURRENT]),
+            "reports over-current; check the resistor at its pin REXT (75 kOhm)",
+        ),
+        RUNS,
+    ],
+)
+"""It has no identity register: CONFIG2 holds our value where it runs, and its own after
+a reset. All is written while it is stopped, and read back."""
+
+
 class MPR121(Chip):
     """One MPR121.
 
@@ -53,6 +93,7 @@ class MPR121(Chip):
     stages = ELECTRODES
     # The limits of its automatic configuration at 3.3 V, times four (AN3889).
     usual_rest = (524, 804)
+    fixed = SCRIPT
     frame_pointer = bytes([RESULTS])
 
     def __init__(
@@ -64,9 +105,6 @@ class MPR121(Chip):
     ) -> None:
         """Identify the chip as far as that is possible without a reset.
 
-        It has no identity register. CONFIG2 holds our value where it runs, and its own
-        after a reset; `settings` resets the chip and checks the latter.
-
         Args:
             bus: a bus or a mux's channel.
             address: 0x5A to 0x5D.
@@ -77,12 +115,6 @@ class MPR121(Chip):
             BusError: the chip does not answer.
         """
         super().__init__(bus, address, into=into)
-        self._state = bus.prepare(write(address, [CONFIG2]), read(address, 2))
-        config = fetch(bus, address, bytes([CONFIG2]), 1)[0]
-        if config not in (RESET_CONFIG2, SET_CONFIG2):
-            raise self.wrong(
-                f"not an MPR121: register 0x5d reads {config:#04x}, not 0x24 or 0x20"
-            )
 
     @staticmethod
     def traits(taxels: int, options: Mapping[str, int]) -> Traits:
@@ -105,48 +137,3 @@ class MPR121(Chip):
         """
         values = data.view("<u2").astype(np.uint16)
         return values, (values != 0) & (values < SATURATED)
-
-    def settings(self) -> Iterator[None]:
-        """Reset, check, write all while stopped, read back, start; one transaction a
-        step.
-
-        Raises:
-            WrongChip: a register does not hold what was written, or the chip reports
-                over-current.
-            BusError: a transaction failed.
-        """
-        send(self.bus, self.address, [RESET, RESET_KEY])
-        self.bus.sleep(RESET_WAIT_S)
-        yield
-        send(self.bus, self.address, [ECR, 0])
-        yield
-        self._check(CONFIG2, (RESET_CONFIG2,), "does not come out of reset")
-        yield
-        for register, values in SETTINGS:
-            send(self.bus, self.address, [register, *values])
-            yield
-        for register, values in SETTINGS:
-            self._check(register, values, "does not keep what is written")
-            yield
-        send(self.bus, self.address, [ECR, RUNNING])
-        yield
-        if fetch(self.bus, self.address, bytes([TOUCH_HIGH]), 1)[0] & OVER_CURRENT:
-            raise self.wrong(
-                "reports over-current; check the resistor at its pin REXT (75 kOhm)"
-            )
-        yield
-        # A reset at any earlier moment shows here: it changes both registers.
-        if not self.healthy():
-            raise self.wrong("loses its settings; check its power")
-
-    def _check(self, register: int, values: tuple[int, ...], otherwise: str) -> None:
-        if fetch(self.bus, self.address, bytes([register]), len(values)) != bytes(
-            values
-        ):
-            raise self.wrong(f"register {register:#04x} of the MPR121 {otherwise}")
-
-    def healthy(self) -> bool:
-        """Whether CONFIG2 and ECR are as they were set; reset and over-current change
-        ECR."""
-        self.bus.transfer(self._state)
-        return self._state.buffer.tobytes() == bytes([SET_CONFIG2, RUNNING])

@@ -60,7 +60,7 @@ def accuracies(name, folder, options):
             "trials": len(dataset.trials),
             "task": task,
             "labels": len(set(dataset.labels(task))),
-            "left out": chosen.left_out,
+            "left out": chosen.held_out,
             "accuracy": f"{chosen.accuracy.accuracy:.0%}",
             "95 % interval": f"{low:.0%} to {high:.0%}",
         }

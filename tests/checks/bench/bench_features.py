@@ -5,12 +5,12 @@ from functools import partial
 import pytest
 
 from edge.demo import FOLDER
+from edge.features.kernels import BIASES, kernel_channels
+from edge.features.names import measures
+from edge.features.vector import WINDOW_S, feature_vector
 from edge.record.recording import load
 from edge.touch.arm import Chain
-from edge.touch.features import WINDOW_S, feature_vector
-from edge.touch.first_contact import first_contact
-from edge.touch.kernels import BIASES, kernel_channels
-from edge.touch.track import ContactTracker
+from edge.touch.track import ContactTracker, first_contact
 from train.data.feature_sets import SETS
 from train.data.kernels import kernel_table
 
@@ -25,8 +25,9 @@ def together(names):
 
 
 def tracker(recording, features):
-    arm = {"chain": Chain.cody(), "joints": recording.joints.shape[1]}
-    return ContactTracker(recording.layout, features=features, **arm)
+    layout = recording.layout
+    measured = measures(layout, features, recording.joints.shape[1])
+    return ContactTracker(layout, chain=Chain.cody(), measures=measured)
 
 
 @pytest.mark.parametrize("names", [*(name for name in SETS if name != "shear"), WHOLE])

@@ -35,7 +35,7 @@ from numpy.typing import NDArray
 from scipy.stats import binom
 
 from edge.decide.early import fastest
-from edge.touch.features import SAMPLES, WINDOW_S
+from edge.features.vector import SAMPLES, WINDOW_S
 from tests.checks.bench import tables
 from tests.checks.bench.program import start
 from tests.checks.bench.shifts import (
@@ -46,6 +46,7 @@ from tests.checks.bench.shifts import (
     fresh_touches,
 )
 from train.choose.candidates import candidates
+from train.choose.options import FitOptions
 from train.data.dataset import DataSet, Measurement, load_trials
 from train.data.feature_sets import expand
 from train.data.parts import part
@@ -103,7 +104,7 @@ class DrawnSet(DataSet):
 
 def simulated(seed):
     """A batch's trials without their frames, and their vectors (windows, n, p)."""
-    choices = candidates({}, joints=True, quick=True)
+    choices = candidates({}, FitOptions(quick=True), joints=True)
     names = [name for candidate in choices for name in candidate.sets]
     with tempfile.TemporaryDirectory() as folder:
         write(scenes.load(SCENE, seed=seed, count=COUNT), folder)
@@ -148,20 +149,20 @@ def judged(drawn, labels):
             right[task, window] = (answered[task][0][0] == y[task]).mean()
     model = fitted.sequential
     new = drawn.pooled(POINTS_S, rest, fitted.dataset.names)
-    hits, confidences, courses = model.judged(new, y)
+    hits, confidences, series = model.judged(new, y)
     unknown = beyond(model.remoteness_.limits, model.space_.scores(new).remoteness)[-1]
     certified = []
     fronts = []
     trusted = []
     for task in y:
-        certified += certificates(task, model.stopping_[task], courses[task])
+        certified += certificates(task, model.stopping_[task], series[task])
         fronts += front_points(task, points, right)
         doubts = trust(hits[task][-1], confidences[task][-1], unknown)
         trusted.append({"task": task, **doubts})
     return certified, fronts, trusted
 
 
-def certificates(task, stopping, course):
+def certificates(task, stopping, time_series):
     """A row for each request: the certified error, the share wrong, and the promised
     and the realised mean seconds, which are missing where the request is refused. The
     first request is the smallest error that is certified."""
@@ -172,7 +173,7 @@ def certificates(task, stopping, course):
         row |= dict.fromkeys(("wrong", "promised, s", "realised, s"), np.nan)
         rule = fastest(stopping, error)
         if rule is not None:
-            at, wrong = course.under(rule)
+            at, wrong = time_series.under(rule)
             row["wrong"] = wrong.mean()
             row["promised, s"] = rule.mean_s
             row["realised, s"] = np.take(POINTS_S, at).mean()

@@ -22,7 +22,7 @@ from sklearn.ensemble import ExtraTreesClassifier
 from sklearn.model_selection import PredefinedSplit, cross_val_predict
 
 from edge.decide.info import StoppingRule
-from edge.touch.features import SAMPLES
+from edge.features.vector import SAMPLES
 from tests.checks.bench import tables
 from tests.checks.bench.program import start
 from train.data.dataset import read
@@ -33,7 +33,7 @@ from train.model.rules import NEVER, THRESHOLDS
 from train.report.work import Workers
 from train.tradeoff.choices import WINDOWS_S as DECISION_POINTS_S
 from train.tradeoff.choices import followed
-from train.tradeoff.early import FOLDS, left_out
+from train.tradeoff.early import FOLDS, held_out_decisions
 
 SECONDS = np.array(DECISION_POINTS_S)
 SETS = (
@@ -132,7 +132,7 @@ def our_curves(ours):
     for threshold in (NEVER, *THRESHOLDS.tolist()):
         rule = StoppingRule(1.0, 0.0, threshold, len(SECONDS) - 1)
         # A label counts even where the contact is unlike all trained ones.
-        stops, wrong = replace(ours.course, withheld=None).under(rule)
+        stops, wrong = replace(ours.time_series, withheld=None).under(rule)
         sure.append((SECONDS[stops].mean(), wrong.mean()))
     return {FIXED: [fixed], SURE: [sure]}
 
@@ -154,7 +154,7 @@ def judge(data, quick, jobs):
         "tasks": tuple(y),
         "quick": quick,
     }
-    compared = left_out(dataset, folds, options, jobs)
+    compared = held_out_decisions(dataset, folds, options, jobs)
     cases = [(by_set, y[task], folds) for task in compared]
     rivals = Workers(jobs).map("peers", peers, cases)
     curves = {}

@@ -8,7 +8,8 @@ import numpy as np
 from hypothesis import strategies as st
 from mpmath import mpf
 
-from edge.touch.features import feature_vector
+from edge.features.names import measures
+from edge.features.vector import feature_vector
 from edge.touch.frame import Frame
 from edge.touch.layout import SkinLayout
 from edge.touch.track import ContactTracker
@@ -93,7 +94,9 @@ def transform_error(counts, scale):
     frame = np.zeros((16, 24), np.uint16)
     frame[4:6, 5:8] = counts
     frames = (Frame(i / 100.0, frame) for i in range(130))
-    contact = contact_of(frames, layout, horizon_s=1.2, features=COURSES)
+    contact = contact_of(
+        frames, layout, horizon_s=1.2, measures=measures(layout, COURSES)
+    )
     vector = feature_vector(contact.series(), 1.2, 8, COURSES).reshape(4, 8)
     with mpmath.workdps(50):
         force = mpf(int(counts)) / mpf(scale)

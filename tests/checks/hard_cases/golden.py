@@ -29,7 +29,7 @@ from tests.checks.hard_cases.neighbours import (
 from tests.conftest import FOREARM, touch
 from train.data.dataset import load_trials
 from train.data.parts import part
-from train.fitting import Fitted
+from train.fitted import Fitted
 from train.model.pipeline import Choice, ContactClassifier
 
 

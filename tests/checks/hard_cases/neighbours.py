@@ -14,7 +14,7 @@ from tests.checks.hard_cases.models import (
 )
 from train.model.pipeline import Choice
 from train.model.projection import FEWEST_UNITS
-from train.report.summary import coarseness
+from train.notes import coarseness
 
 MANY = 1400
 WHOLE = "Python's whole numbers"

@@ -19,7 +19,7 @@ from tests.checks.hard_cases.models import exported, features, one_by_one
 from tests.checks.hard_cases.neighbours import near_duplicates, offset_data
 from train.data.folds import stratified_folds
 from train.model.pipeline import Choice
-from train.model.stopping import Early, SequentialClassifier
+from train.model.stopping import EarlySettings, SequentialClassifier
 
 POINTS_S = (0.4, 0.8, 1.2)
 LDA = {"projection": "lda", "shrinkage": 0.1}
@@ -82,7 +82,7 @@ class Whole:
         self.y = labels_of(n)
         # Early windows: of the same trials, with less of what tells them apart.
         self.X = np.stack([X[::-1], 0.5 * (X + X[::-1]), X])
-        early = Early(FIRST, [FIRST] * 10) if kind == EARLY else None
+        early = EarlySettings(FIRST, [FIRST] * 10) if kind == EARLY else None
         classifier = SequentialClassifier(CHOICES, POINTS_S, early=early)
         folds = stratified_folds(self.y["object"])
         self.fitted = classifier.fit(self.X, self.y, folds, [CHOICES] * 10)

@@ -3,14 +3,13 @@
 import numpy as np
 from hypothesis import strategies as st
 
+from edge.features.kernels import SAMPLES, KernelTable, shares
 from edge.touch.frame import Frame
-from edge.touch.kernels import SAMPLES, KernelTable, shares
 from edge.touch.layout import SkinLayout
-from edge.touch.zones import quantities
 from tests.checks.hard_cases.cases import SEEDS, Case, Ladder
-from tests.edge.touch.pressed import zones_of
-from tests.edge.touch.test_kernels import by_hand
-from tests.edge.touch.test_measures import moments
+from tests.edge.features.test_kernels import by_hand
+from tests.edge.features.test_names import moments
+from tests.edge.touch.pressed import quantities, zones_of
 
 
 def kernels_error(bits, seed):
@@ -34,7 +33,7 @@ def moments_error(rows, seed):
     counts[rng.integers(rows), 0] = 65535
     frame = Frame(0.0, counts.astype(np.uint16))
     numbers = zones_of(layout, frame, ["skin_force"])["skin"]
-    measured = quantities(np.array([numbers]), layout)
+    measured = quantities([numbers], layout)
     true = moments(np.c_[np.argwhere(counts), counts[counts > 0]].tolist())
     sizes = {name: true[name] for name in ("spread_along", "spread_around", "length")}
     sizes["slant"] = sizes["spread_along"] * sizes["spread_around"]

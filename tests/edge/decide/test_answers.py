@@ -11,7 +11,7 @@ from edge.decide.classifier import Classifier
 from edge.decide.model import Model
 from edge.errors import InputError
 from tests.edge.decide.test_classifier import decided, decisions
-from tests.edge.touch.test_joint_doubts import RATE, series, stopped
+from tests.edge.decide.test_joint_doubts import RATE, series, stopped
 
 
 def without_a_pose(touch):

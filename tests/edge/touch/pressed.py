@@ -1,13 +1,16 @@
 """Frames in which a few taxels are pressed, the contact that they make, and the whole
 numbers of a frame's zones."""
 
+from types import SimpleNamespace
+
 import numpy as np
 
-from edge.touch.active import ActiveTaxels
-from edge.touch.contact import feature_types
+from edge.features.names import PAPER, measures
+from edge.features.quantities import OF_ZONES
+from edge.features.zones import ZoneSeries
 from edge.touch.frame import Frame
+from edge.touch.region import ActiveTaxels
 from edge.touch.track import DEBOUNCE, ContactTracker
-from edge.touch.zones import Zones
 
 
 def pressed(layout, t, taxels, **more):
@@ -19,9 +22,10 @@ def pressed(layout, t, taxels, **more):
     return Frame(t, counts, **more)
 
 
-def followed(layout, frames, debounce=DEBOUNCE, **options):
+def followed(layout, frames, debounce=DEBOUNCE, features=PAPER, joints=0, **options):
     """The last contact that a frame belongs to."""
-    tracker = ContactTracker(layout, debounce, **options)
+    measured = measures(layout, features, joints)
+    tracker = ContactTracker(layout, debounce, measures=measured, **options)
     contact = None
     for frame in frames:
         (contact,) = tracker.push(frame) or [contact]
@@ -41,7 +45,14 @@ def active_of(layout, frame):
 def zones_of(layout, frame, features):
     """{zone: its whole numbers} of a frame, as features need them."""
     active = active_of(layout, frame)
-    zones = Zones(layout, feature_types(features))
+    zones = measures(layout, features).zones
     row = zones.measure(active, active.largest(), frame.shear)
     split = zones.split(np.array([row], dtype=np.int64))
     return {zone: numbers[0].tolist() for zone, numbers in split.items()}
+
+
+def quantities(sums, layout, shear=False):
+    """{quantity: (n,)} of the whole numbers (n, width) of a zone."""
+    series = SimpleNamespace(zones={"skin": np.array(sums)}, layout=layout)
+    zone = ZoneSeries(series, "skin")
+    return {n: q.measure(zone) for n, q in OF_ZONES.items() if q.shear == shear}

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from edge.errors import InputError
-from edge.touch.arm import Chain, Joint
+from edge.touch.arm import Chain, Joint, read_arm
 
 
 def test_a_urdf_chain_agrees_with_yourdfpy(urdf):
@@ -131,3 +131,17 @@ def test_a_point_is_where_the_pose_takes_it(seed):
         pose = chain.pose(q)
         point = chain.point(q, tuple(at))
         assert point == pytest.approx(pose[:3, :3] @ at + pose[:3, 3], abs=1e-14)
+
+
+def test_a_urdf_is_read_between_two_links(urdf):
+    assert read_arm(urdf, "base", "tool").dof == 3
+
+
+def test_a_urdf_without_its_links_is_refused(urdf):
+    with pytest.raises(InputError, match="a URDF needs --base and --tip"):
+        read_arm(urdf)
+
+
+def test_links_are_for_a_urdf_alone():
+    with pytest.raises(InputError, match="--base and --tip are for a .urdf file"):
+        read_arm("arm.toml", "base", "tool")

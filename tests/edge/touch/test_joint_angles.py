@@ -5,8 +5,8 @@ import pytest
 
 from edge.errors import InputError
 from edge.touch.joint_angles import JointAngles, joint_columns
+from tests.edge.decide.test_joint_doubts import LAYOUT, RATE, doubts, moving, series
 from tests.edge.touch.pressed import pressed
-from tests.edge.touch.test_joint_doubts import LAYOUT, RATE, doubts, moving, series
 
 
 def test_joints_that_a_source_lacks_are_named_with_those_that_it_has():

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from edge.errors import InputError
-from edge.touch.layout import SkinLayout, for_device
+from edge.touch.layout import SkinLayout, differences, for_device
 from tests.conftest import FOREARM
 
 ANGLES = [
@@ -103,3 +103,18 @@ def test_thresholds_stay_counts_however_far_the_scales_differ():
     matched = for_device(replace(FOREARM, counts_per_newton=1e-5), device)
     assert matched.threshold_counts == 65535
     assert matched.onset == 65535
+
+
+@pytest.mark.parametrize(
+    ("changes", "sentence"),
+    [
+        ({"dead": (3, 4)}, "2 taxels are dead that were alive in training"),
+        ({"counts_per_newton": 900.0}, "a newton is 900 counts, and 1000 in training"),
+        ({"pitch_m": 0.02}, "taxels are 20 x 20 mm apart, and 10 x 10 mm in training"),
+    ],
+)
+def test_what_differs_from_the_models_skin_is_said(changes, sentence):
+    model = SkinLayout(4, 4, counts_per_newton=1000.0, pitch_m=0.01)
+    (difference, *_) = differences(model, replace(model, **changes))
+    assert sentence in difference
+    assert differences(model, model) == []

@@ -7,9 +7,8 @@ import pytest
 
 from edge.errors import InputError
 from edge.touch.arm import Chain, Joint
-from edge.touch.first_contact import first_contact
 from edge.touch.layout import SkinLayout, for_device
-from edge.touch.track import DEBOUNCE, ContactTracker
+from edge.touch.track import DEBOUNCE, ContactTracker, first_contact
 from tests.conftest import in_a_row
 from tests.edge.touch.pressed import followed, pressed
 

@@ -2,11 +2,10 @@
    graph's outputs, recordings by their vectors or their events. */
 #include <stdio.h>
 
-#include "baseline.h"
 #include "internal.h"
 
 /* Behind the last one, the slices of a decision for each frame are added. */
-enum { VECTOR, VECTORS_OF_RECORDING, BASELINE, COSTS, SELFTEST, EVENTS_OF_RECORDING };
+enum { VECTOR, VECTORS_OF_RECORDING, COSTS, SELFTEST, EVENTS_OF_RECORDING };
 
 typedef struct {
   double t;
@@ -119,20 +118,6 @@ static void classify(uint32_t frames, uint32_t slices) {
   give(end, 10);
 }
 
-/* Raw counts, which the baseline follows by steps of 300 within 20 counts, from those of the first
-   frame; a touch lowers them, beyond a dead band of 3. */
-static void follow(uint32_t frames) {
-  static ec_baseline taxels[EC_ROWS * EC_COLS];
-  static uint16_t counts[EC_ROWS * EC_COLS];
-  for (uint32_t i = 0; i < frames; i++) {
-    frame next = next_frame();
-    if (i == 0) ec_baseline_begin(taxels, EC_ROWS * EC_COLS, next.counts, 20);
-    ec_baseline_above(taxels, EC_ROWS * EC_COLS, next.counts, -1, 3, counts);
-    ec_baseline_follow(taxels, EC_ROWS * EC_COLS, next.counts, next.valid, 300);
-    for (uint32_t j = 0; j < EC_ROWS * EC_COLS; j++) give((double[]){counts[j]}, 1);
-  }
-}
-
 #if defined(__arm__)
 /* With -icount shift=0 QEMU takes a nanosecond for an instruction; the timer of its boards counts down
    at 25 MHz. */
@@ -185,8 +170,6 @@ int main(void) {
       give_outputs();
     } else if (question[0] == VECTORS_OF_RECORDING) {
       give_vectors(question[1]);
-    } else if (question[0] == BASELINE) {
-      follow(question[1]);
     } else if (question[0] == COSTS) {
       measure(question[1]);
     } else if (question[0] == SELFTEST) {

@@ -11,7 +11,7 @@ from edge.decide.classifier import Classifier, suited
 from edge.decide.events import Decided, Onset, Release
 
 HERE = Path(__file__).parent
-VECTOR, VECTORS_OF_RECORDING, BASELINE, COSTS, SELFTEST, EVENTS_OF_RECORDING = range(6)
+VECTOR, VECTORS_OF_RECORDING, COSTS, SELFTEST, EVENTS_OF_RECORDING = range(5)
 ABOUT_ITSELF = struct.pack("<II", SELFTEST, 0)
 """The question whether `ec_selftest` passes."""
 WARNINGS = "-Wall -Wextra -Werror -Wconversion -Wdouble-promotion -pedantic"

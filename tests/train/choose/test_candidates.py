@@ -8,10 +8,10 @@ from train.choose.candidates import (
     PLAIN,
     WITH_JOINTS,
     WITH_SHEAR,
-    Fixed,
     candidates,
     costs,
 )
+from train.choose.options import FitOptions
 from train.data.feature_sets import expand
 from train.model.pipeline import Choice
 from train.model.scaling import BY_COLUMN
@@ -46,16 +46,16 @@ def test_columns_are_scaled_too_where_motions_of_joints_stand_beside_other_featu
     assert not {(BY_COLUMN, True, False), (BY_COLUMN, False, True)} & scalings
 
 
-def sets_of(known=False, **words):
+def sets_of(known=False, quick=False, **words):
     """The feature sets that are candidates, for known things alone or for all."""
-    every = candidates(TASKS, **words)
+    every = candidates(TASKS, FitOptions(quick=quick), **words)
     return {c.sets for c in every if c.known == known}
 
 
 def test_features_of_joints_are_candidates_where_recordings_have_them():
     assert sets_of() == set(PLAIN)
     assert sets_of(joints=True) == set(WITH_JOINTS)
-    assert len(candidates(TASKS, joints=True, quick=True)) == 3
+    assert len(candidates(TASKS, FitOptions(quick=True), joints=True)) == 3
 
 
 def test_features_of_shear_are_candidates_where_recordings_have_it():
@@ -84,7 +84,12 @@ def test_every_feature_set_but_the_papers_is_tried_with_both_projections():
 
 
 def test_settings_that_are_fixed_are_held():
-    (candidate,) = candidates(TASKS, Fixed(["paper"], "pca", "V", 3, 2))
+    (candidate,) = candidates(
+        TASKS,
+        FitOptions(
+            features=["paper"], projection="pca", scaling="V", components=3, k=2
+        ),
+    )
     (grid,) = candidate.grids
     assert candidate.name == "paper"
     assert grid.features == expand(["paper"])

@@ -2,7 +2,6 @@
 
 from collections import defaultdict
 from dataclasses import replace
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -10,12 +9,12 @@ import pytest
 import train
 from edge.decide.statistics import wilson
 from edge.record.saving import save
-from train.choose.choose import Choosing, decided_together
-from train.choose.evaluate import AnswerTable, Promise
-from train.choose.protocols import HALVINGS, Protocol, rule_among
+from train.choose.choose import decided_together
+from train.choose.evaluate import AnswerTable, NestedAccuracy
+from train.choose.protocols import Protocol, rule_among
 from train.choose.rule import Rule
 from train.choose.settings import Chosen
-from train.data.groups import Divisions, Groups
+from train.data.groups import Groups
 from train.data.parts import part
 from train.data.vectors import Vectors
 from train.model.pipeline import Choice, ContactClassifier, vote
@@ -61,21 +60,6 @@ def test_tasks_with_groups_share_the_best_mean_of_both_protocols():
     assert by_groups.accuracy("u").accuracy == 8 / 12
     alone = replace(by_groups, sharing="t")
     assert alone.answers("t").mean(axis=1).tolist() == [0.5, 0.5]
-
-
-def test_halves_of_the_folds_agree_where_one_candidate_is_right_in_all_of_them():
-    choices = [Choice("IV", 1, 1, features=(name,)) for name in TWO]
-    folds = np.arange(40) // 10
-    best = np.stack([folds >= 0, folds < 0])
-    mixed = np.stack([folds < 2, folds >= 2])
-
-    def agreed(right):
-        table = AnswerTable(folds, {"t": choices}, {"t": np.stack([right] * 4)})
-        return Protocol(table, most_accurate).agreed("t")
-
-    assert agreed(best) == HALVINGS
-    # They differ where a half has both folds in which one of the two is right.
-    assert 0 < agreed(mixed) < HALVINGS
 
 
 def test_among_few_trials_the_most_accurate_is_chosen_whatever_its_price():
@@ -124,7 +108,7 @@ def hits(agreeing):
     return right
 
 
-NONE_RIGHT = Promise(0, 60, hits=np.zeros(60, dtype=bool))
+NONE_RIGHT = NestedAccuracy(0, 60, hits=np.zeros(60, dtype=bool))
 
 
 def test_tasks_that_agree_are_scored_as_they_are_decided_together(agreeing, hits):
@@ -208,43 +192,6 @@ def test_a_longer_window_has_no_more_decision_points(late):
 def test_touches_that_differ_early_are_told_in_the_usual_window(make_touch, tmp_path):
     early = train.fit(touches(make_touch, tmp_path, 6.0, 0.4), **FEW)
     assert early.window_s == 1.2
-
-
-@pytest.fixture
-def window_of(monkeypatch):
-    """The function that chooses among three windows by forty trials with an onset, of
-    which they have some wrong."""
-    wrong = {1.2: range(8), 2.4: (0, 1), 4.8: (2,)}
-
-    def chosen(onset_s, worth):
-        recording = SimpleNamespace(t=np.arange(3.0))
-        trials = [SimpleNamespace(onset_s=onset_s, recording=recording)] * 40
-        dataset = SimpleNamespace(trials=trials, names=(), widths=lambda samples: ())
-        folds = np.arange(40) % 3
-        divisions = Divisions(folds, (), None)
-        choosing = Choosing(dataset, {"t": folds.astype(str)}, (), divisions, samples=1)
-        answers = {w: {"t": 1.0 - np.isin(np.arange(40), wrong[w])} for w in wrong}
-        monkeypatch.setattr(choosing, "_right", answers.get)
-        return choosing.window(tuple(wrong), worth)
-
-    return chosen
-
-
-@pytest.mark.parametrize(
-    ("worth", "seconds"), [(0.0, 4.8), (0.005, 4.8), (0.02, 2.4), (0.2, 1.2)]
-)
-def test_a_window_is_worth_its_accuracy_less_its_wait(window_of, worth, seconds):
-    """Of forty trials 8, 2 and 1 are wrong after 1.2, 2.4 and 4.8 s."""
-    window_s, _ = window_of(onset_s=0.5, worth=worth)
-    assert window_s == seconds
-
-
-def test_what_a_longer_window_gains_is_said_with_its_option(window_of):
-    _, (note, gain) = window_of(onset_s=0.5, worth=0.02)
-    assert note.startswith(
-        "the window is 2.4 s: a second of waiting counts as 2 points"
-    )
-    assert gain == "--window 4.8: t 98% instead of 95% in cross-validation"
 
 
 @pytest.mark.parametrize(

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from edge.record.saving import save
-from train.choose.candidates import Fixed, candidates, features_of
+from train.choose.candidates import candidates, features_of
 from train.choose.choose import Choosing
 from train.choose.early import (
     SHARES,
@@ -18,6 +18,7 @@ from train.choose.early import (
     early_options,
     settle_early,
 )
+from train.choose.options import FitOptions
 from train.data.dataset import Measurement, load_trials
 from train.data.groups import Divisions
 from train.data.vectors import Vectors
@@ -68,7 +69,7 @@ def test_decision_points_before_the_full_window_have_settings_of_their_own(
     for kind, seed in product(("hard", "soft"), range(5)):
         touch = make_touch(kind=kind, seed=seed, labels={"softness": kind})
         save(tmp_path / f"{kind}-{seed}.npz", touch)
-    (contact,) = candidates({}, Fixed(["contact"], "lda"))
+    (contact,) = candidates({}, FitOptions(features=["contact"], projection="lda"))
     dataset = load_trials([tmp_path], Measurement(features_of([contact])))
     y = {"softness": dataset.labels("softness")}
     choosing = Choosing(dataset, y, [contact], Divisions.of(dataset, y), samples=10)

@@ -11,14 +11,13 @@ from edge.decide.statistics import wilson
 from edge.errors import InputError
 from train.choose.evaluate import (
     AnswerTable,
-    Promise,
+    NestedAccuracy,
     Result,
-    chosen_by_fold,
     evaluate,
     fits,
-    nested_accuracy,
 )
-from train.choose.rule import Rule
+from train.choose.protocols import Protocol
+from train.choose.rule import MOST_ACCURATE, Rule
 from train.choose.search import SearchGrid
 from train.data.folds import group_folds, stratified_folds
 from train.data.vectors import Vectors
@@ -30,6 +29,11 @@ GRIDS = (
     SearchGrid("none", "pca", components=(1, 4, 30), neighbours=(1, 3)),
     SearchGrid("IV", "pca", ("contact_area",), components=(2,), neighbours=(5,)),
 )
+
+
+def by_trial(table):
+    """The most accurate choice by a table's answers."""
+    return Protocol(table, lambda *_: MOST_ACCURATE)
 
 
 def trials(n=36, seed=0):
@@ -89,7 +93,7 @@ def test_trials_without_a_label_or_a_fold_are_not_tested():
     table = evaluate(vectors, folds, GRIDS)
     tested = (folds >= 0) & (vectors.y["t"] != "")
     assert (table.tested["t"] == tested).all()
-    assert nested_accuracy(table, "t").total == tested.sum()
+    assert by_trial(table).accuracy("t").total == tested.sum()
     for fold in range(3):
         test = tested & (folds == fold)
         assert_exported(table, fold, vectors, folds != fold, test)
@@ -104,13 +108,13 @@ def test_nested_accuracy_is_that_of_choosing_anew_without_each_fold():
         answers = table.right["t"][fold]
         best = answers[:, folds != fold].sum(axis=1).argmax()
         right += answers[best, folds == fold].sum()
-    assert nested_accuracy(table, "t").right == right
+    assert by_trial(table).accuracy("t").right == right
 
 
 def test_a_promise_is_as_wide_as_two_fifths_of_its_trials_make_it():
     assert Result(90, 100).interval == wilson(90, 100)
-    assert Promise(90, 100).interval == wilson(36, 40)
-    assert Promise(90, 100, variance=10.0).interval == wilson(9, 10)
+    assert NestedAccuracy(90, 100).interval == wilson(36, 40)
+    assert NestedAccuracy(90, 100, variance=10.0).interval == wilson(9, 10)
 
 
 def test_folds_of_groups_part_no_group():
@@ -160,8 +164,8 @@ def test_further_divisions_count_in_the_choice_by_all_trials_alone():
         [1.0, 1.0, 0.5, 0.5],
     ]
     assert Rule().choose(repeated_table.plain("t")) == 1
-    assert chosen_by_fold(repeated_table, "t") == [0, 0]
-    assert chosen_by_fold(table(first), "t") == [0, 0]
+    assert by_trial(repeated_table).places("t", MOST_ACCURATE) == [0, 0]
+    assert by_trial(table(first)).places("t", MOST_ACCURATE) == [0, 0]
 
 
 def test_of_graded_candidates_that_are_equally_right_the_clearer_is_chosen():
@@ -180,7 +184,7 @@ def test_of_graded_candidates_that_are_equally_right_the_clearer_is_chosen():
     table = evaluate(replace(vectors, X=X), folds, graded)
     assert Rule().choose(plain.plain("t")) == 0
     assert Rule().choose(table.plain("t")) == 1
-    assert chosen_by_fold(table, "t") == [1] * 4
+    assert by_trial(table).places("t", MOST_ACCURATE) == [1] * 4
 
 
 def test_a_graded_answer_that_is_wrong_counts_as_wrong():

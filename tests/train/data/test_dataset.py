@@ -10,10 +10,10 @@ from edge.decide.classifier import Classifier
 from edge.decide.model import Model
 from edge.decide.verify import verify
 from edge.errors import InputError
+from edge.features.vector import feature_vector
 from edge.record.recording import load
 from edge.record.saving import save
 from edge.touch.arm import Chain
-from edge.touch.features import feature_vector
 from tests.conftest import export, in_a_row
 from tests.edge.record.test_recording import sheared as with_shear
 from train.data.dataset import Measurement, load_trials, read

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from edge.errors import InputError
-from edge.touch.features import FEATURES, feature_vector, widths
+from edge.features.names import feature
+from edge.features.vector import FEATURES, feature_vector, widths
 from edge.touch.layout import SkinLayout
-from edge.touch.measures import feature
 from tests.edge.touch.pressed import followed, pressed
 from train.data.feature_sets import SETS, expand, unit
 

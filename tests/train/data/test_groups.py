@@ -62,13 +62,13 @@ def test_entire_kinds_are_left_out_where_every_class_has_three(
     for thing, touch in drawn_touches(make_touch, kinds).items():
         save(tmp_path / f"{thing}.npz", touch)
     fitted = train.fit(str(tmp_path), features=["paper"], projection="pca", jobs=1)
-    assert fitted.chosen["category"].left_out == left_out
+    assert fitted.chosen["category"].held_out == left_out
     assert {
         max(grid.components)
         for candidate in fitted.candidates
         for grid in candidate.grids
     } == {10}
-    assert fitted.chosen["object"].left_out == "trial"
+    assert fitted.chosen["object"].held_out == "trial"
 
 
 def test_a_representative_part_has_every_set_of_labels_and_their_shares():

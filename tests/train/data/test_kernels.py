@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from edge.touch.kernels import SAMPLES, convolution_of_bias, convolved, shifted
+from edge.features.kernels import SAMPLES, convolution_of_bias, convolved, shifted
 from train.data.kernels import kernel_table
 
 RNG = np.random.default_rng(5)

@@ -4,12 +4,8 @@ from dataclasses import replace
 
 import numpy as np
 
-import train
-from edge.record.saving import save
 from train.data.parts import part
 from train.data.thresholds import count_contacts, proposed
-
-GIVEN = {"features": ["paper"], "decision_points_s": (), "quick": True, "jobs": 1}
 
 
 def noisy(recording, seed):
@@ -91,37 +87,3 @@ def test_a_proposal_that_misses_touches_is_as_high_as_the_noise(make_touch):
     assert weak.onset == 60  # the touch peaks at 70
     strong = [noisy(make_touch(seed=seed), seed) for seed in range(4)]
     assert proposed(strong).threshold == 80
-
-
-def saved(folder, make_touch, **skin):
-    for seed in range(12):
-        touch = make_touch(kind=("hard", "soft")[seed % 2], seed=seed)
-        save(
-            folder / f"{seed:02}.npz", weaker(touch, 0.3 if seed % 3 else 0.08, **skin)
-        )
-    return str(folder)
-
-
-def test_lower_thresholds_are_taken_where_they_decide_better(make_touch, tmp_path):
-    high = {"threshold_counts": 150, "onset_counts": 200}
-    data = saved(tmp_path, make_touch, **high)
-    fitted = train.fit(data, **GIVEN)
-    assert fitted.dataset.layout.threshold_counts < 150
-    assert "recordings show no contact; in cross-validation" in fitted.notes[0]
-    assert not fitted.dataset.untouched
-
-
-def test_a_skin_saved_without_thresholds_gets_those_of_its_noise(make_touch, tmp_path):
-    data = saved(tmp_path, make_touch, threshold_counts=None, onset_counts=None)
-    fitted = train.fit(data, **GIVEN)
-    assert "warning: the skin was saved without thresholds" in fitted.notes[0]
-    assert all(trial.onset_s > trial.recording.t[0] for trial in fitted.dataset.trials)
-
-
-def test_an_export_without_a_contact_at_the_saved_thresholds_proposes_others(
-    make_touch, tmp_path
-):
-    folder = saved(tmp_path, make_touch, threshold_counts=39619, onset_counts=59000)
-    fitted = train.fit(folder, **GIVEN)
-    assert len(fitted.dataset.trials) == 12
-    assert any("no recording has a contact at its own" in note for note in fitted.notes)

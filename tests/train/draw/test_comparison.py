@@ -50,13 +50,6 @@ def test_a_dark_page_gets_light_lines_on_a_dark_background(tmp_path):
         assert (corner.mean() < 0.1) == bool(dark)
 
 
-def test_contacts_are_numbered_from_one(make_touch):
-    comparison.contact_of("a", make_touch(), 1)
-    for number in (0, 2):
-        with pytest.raises(InputError, match=f"a: holds no contact {number}"):
-            comparison.contact_of("a", make_touch(), number)
-
-
 def test_too_many_or_an_empty_one_are_refused(make_touch, tmp_path):
     with pytest.raises(InputError, match="give 6"):
         comparison.draw([("a", make_touch())] * 7, tmp_path / "a.png")

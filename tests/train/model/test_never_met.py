@@ -6,8 +6,8 @@ import pytest
 from train.model.never_met import (
     SHARE,
     known_of,
+    object_folds,
     remoteness_of,
-    thing_folds,
     worth_of,
 )
 
@@ -20,10 +20,10 @@ def remote(middle, n=400, seed=0):
 
 def test_entire_things_are_left_out_where_there_are_enough():
     labels = np.repeat(["a", "b", "c", "d", "e", ""], 3)
-    folds = thing_folds(labels)
+    folds = object_folds(labels)
     assert (folds[labels == ""] == -1).all()
     assert len({*zip(labels, folds, strict=True)}) == 6
-    assert thing_folds(labels[3:]) is None
+    assert object_folds(labels[3:]) is None
 
 
 def test_the_probability_is_that_of_a_share_of_unmet_things():

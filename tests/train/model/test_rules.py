@@ -12,7 +12,7 @@ from edge.decide.info import StoppingRule
 from train.model.rules import (
     NEVER,
     RISK,
-    Course,
+    TimeSeries,
     agreeing,
     certify,
     stops,
@@ -48,9 +48,9 @@ class TestStops:
 SECONDS = np.array([0.4, 0.8, 1.2])
 
 
-def course(confidence, wrong):
+def time_series(confidence, wrong):
     """Of a task that is no product; no contact is unknown."""
-    return Course([confidence], [wrong], np.zeros_like(wrong))
+    return TimeSeries([confidence], [wrong], np.zeros_like(wrong))
 
 
 def drawn(n, rng):
@@ -67,7 +67,7 @@ def test_a_rule_is_certified_no_lower_than_those_tested_before_it():
     which is tested first, has 20 of 100 wrong."""
     wrong = np.zeros((3, 100), dtype=bool)
     wrong[-1, :20] = True
-    rules = certify(course(np.full((3, 100), 0.9), wrong), SECONDS)
+    rules = certify(time_series(np.full((3, 100), 0.9), wrong), SECONDS)
     assert [rule.error for rule in rules] == [
         pytest.approx(upper_limit(20, 100, TEST_SHARE * RISK))
     ]
@@ -84,7 +84,7 @@ def test_certificates_fail_no_oftener_than_they_say():
         confidence, right = drawn(100, rng)
         able = [
             rule
-            for rule in certify(course(confidence, ~right), SECONDS)
+            for rule in certify(time_series(confidence, ~right), SECONDS)
             if rule.error <= error
         ]
         if able:
@@ -98,7 +98,7 @@ def test_equal_rules_are_a_fixed_window_and_certain_error_is_no_rule():
     wrong = np.zeros((3, 100), dtype=bool)
     wrong[0] = True
     confidence = np.outer([0.0, 1.0, 1.0], np.ones(100))
-    full, fixed = certify(course(confidence, wrong), SECONDS)
+    full, fixed = certify(time_series(confidence, wrong), SECONDS)
     assert full == StoppingRule(full.error, 1.2, NEVER, 2)
     assert (fixed.confidence, fixed.last) == (NEVER, 1)
 
@@ -106,7 +106,7 @@ def test_equal_rules_are_a_fixed_window_and_certain_error_is_no_rule():
 def test_a_task_is_wrong_where_it_names_nothing_when_it_is_decided():
     right = np.zeros((3, 2), dtype=bool)
     withheld = np.array([[True, False], [False, False], [False, True]])
-    decided = Course([np.full((3, 2), 0.9)], [right], right, withheld)
+    decided = TimeSeries([np.full((3, 2), 0.9)], [right], right, withheld)
     _, wrong = decided.under(StoppingRule(0.1, 1.0, 0.7, 2))
     assert wrong.tolist() == [True, False]
 
@@ -120,7 +120,9 @@ class TestProduct:
 
     def product(self):
         right = np.zeros_like(self.WRONG)
-        return Course([self.FAST, self.SLOW], [right, self.WRONG], np.zeros_like(right))
+        return TimeSeries(
+            [self.FAST, self.SLOW], [right, self.WRONG], np.zeros_like(right)
+        )
 
     def test_is_decided_with_the_later_factor_and_wrong_where_either_is(self):
         at, wrong = self.product().under(StoppingRule(0.1, 1.0, 0.7, 2))
@@ -132,13 +134,13 @@ class TestProduct:
 
     def agreeing(self, *rules):
         """The rules of the product and of its fast factor."""
-        courses = {
-            "fast": course(self.FAST, np.zeros_like(self.WRONG)),
-            "slow": course(self.SLOW, self.WRONG),
+        series = {
+            "fast": time_series(self.FAST, np.zeros_like(self.WRONG)),
+            "slow": time_series(self.SLOW, self.WRONG),
             "product": self.product(),
         }
         factors = ("fast", "slow")
-        by_task = agreeing("product", factors, {"product": rules}, courses, SECONDS)
+        by_task = agreeing("product", factors, {"product": rules}, series, SECONDS)
         return by_task["product"], by_task["fast"]
 
     LIMIT = upper_limit(0, 2, TEST_SHARE * RISK)
@@ -165,7 +167,7 @@ def test_a_family_has_half_the_level_and_goes_on_from_its_last_limit():
     it."""
     wrong = np.zeros((3, 100), dtype=bool)
     wrong[1, :10] = True
-    full, fast = certify(course(np.zeros((3, 100)), wrong), SECONDS)
+    full, fast = certify(time_series(np.zeros((3, 100)), wrong), SECONDS)
     level = TEST_SHARE * RISK
     assert (full.last, full.error) == (2, upper_limit(0, 100, level))
     assert (fast.last, fast.error) == (0, upper_limit(10, 100, level / 2))

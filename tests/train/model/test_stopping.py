@@ -61,8 +61,8 @@ def test_rules_ask_for_the_same_margin_at_every_decision_point():
     excess = excess_of(model.novelty_, model.space_.scores(X).novelty)
     first, second, last = (at.tasks_["t"].slope for at in model.decision_points_)
     assert first == second != last
-    *_, courses = model.judged(X, {"t": labels})
-    log_odds = logit(courses["t"].confidences[0])
+    *_, series = model.judged(X, {"t": labels})
+    log_odds = logit(series["t"].confidences[0])
     stopping = model.stopping_["t"]
     expected = stopping.slope * margins + stopping.intercept - stopping.doubt * excess
     assert log_odds == pytest.approx(expected)

@@ -1,15 +1,8 @@
-"""Pictures of a report: the same numbers give the same bytes, for a page and for a
-phone."""
-
-import io
+"""Pictures of a report: the same numbers give the same bytes."""
 
 import numpy as np
-import pytest
-from matplotlib.image import imread
 
-from train.choose.evaluate import Result
-from train.report import figures
-from train.report.figures import PHONE, STROKES, bars, confusion
+from train.report.figures import confusion
 
 
 def test_the_same_numbers_give_the_same_bytes_and_others_do_not():
@@ -18,36 +11,8 @@ def test_the_same_numbers_give_the_same_bytes_and_others_do_not():
     first = confusion("n", "t", truth, answers)
     assert first == confusion("n", "t", truth, answers)
     assert first.png != confusion("n", "t", truth, truth).png
-    assert imread(io.BytesIO(first.narrow)).shape[1] == PHONE * 200
-
-
-@pytest.mark.parametrize("classes", [2, 8, 36])
-def test_a_confusion_matrix_has_names_on_both_sides(classes, monkeypatch):
-    names = np.array([f"object {i:02}" for i in range(classes)])
-    sides = []
-
-    def spy(axes, counts, fontsize):
-        for ticks in (axes.get_xticklabels(), axes.get_yticklabels()):
-            sides.append([tick.get_text() for tick in ticks])
-
-    monkeypatch.setattr(figures, "_draw_matrix", spy)
-    confusion("n", "t", names, names)
-    assert sides == [list(names)] * 4
 
 
 def test_a_label_with_dollar_signs_is_no_formula():
     labels = np.array([r"a $\frac$ b", "c"])
     assert confusion("n", r"no $\frac$ either", labels, labels).png
-
-
-def test_more_tasks_than_strokes_have_bars_all_the_same(monkeypatch):
-    tasks = [f"task {i}" for i in range(len(STROKES) + 1)]
-    listed = []
-
-    def spy(canvas, axes, columns):
-        listed.append(axes.get_legend_handles_labels()[1])
-
-    monkeypatch.setattr(figures, "legend", spy)
-    bars("n", "t", ["method"], {task: [Result(1, 2)] for task in tasks})
-    page, phone = listed
-    assert page == phone == tasks

@@ -49,7 +49,7 @@ def table(page, name):
 
 def test_what_holds_for_every_task_stands_once_before_them(written):
     text = written[1].read_text()
-    assert text.index("Wilson's for two fifths") < text.index("Accuracy: category")
+    assert text.index("for two fifths") < text.index("Accuracy: category")
     assert 'aria-label="category: scores of each class"' in text
 
 
@@ -57,7 +57,7 @@ def test_the_answers_are_those_that_the_nested_accuracy_counts(written):
     fitted, page = written
     result = fitted.chosen["category"].accuracy
     answers = report.answers_of(fitted)["category"]
-    assert ((answers.answers[-1] == answers.truth) == result.hits).all()
+    assert ((answers.answers == answers.truth) == result.hits).all()
     rows = table(page, "recall_category")
     # The touch that was missed is rigid, and counts as answered wrongly.
     assert [(row["category"], row["trials"]) for row in rows] == [
@@ -66,10 +66,7 @@ def test_the_answers_are_those_that_the_nested_accuracy_counts(written):
     ]
     right = sum(float(row["recall %"]) * int(row["trials"]) / 100.0 for row in rows)
     assert right == pytest.approx(result.right, abs=0.01)
-    assert (
-        f"{result.accuracy:.1%} of 16 trials are classified correctly"
-        in page.read_text()
-    )
+    assert f"{result.accuracy:.1%} of 16 trials are right" in page.read_text()
     assert "The trials include 1 recording without a contact." in page.read_text()
 
 
@@ -85,21 +82,10 @@ def test_a_wrong_answer_is_named_with_its_nearest_trial_and_its_strongest_pull(w
     assert row["strongest pull"] in ("max_force", "contact_area", "contact_motion")
 
 
-def test_features_learning_curve_and_prices_have_their_tables(written):
-    fitted, page = written
+def test_features_and_prices_have_their_tables(written):
+    _, page = written
     shares = [float(row["category, % of pull"]) for row in table(page, "features")]
     assert sum(shares) == pytest.approx(100.0, abs=0.02)
-    learning = table(page, "learning")
-    assert [int(row["trials"]) for row in learning] == [
-        3,
-        6,
-        9,
-        12,
-    ]  # four of five folds of 15
-    hits = fitted.chosen["category"].accuracy.hits
-    assert float(learning[-1]["category %"]) == pytest.approx(
-        100 * hits.mean(), abs=0.01
-    )
     assert [row["features"] for row in table(page, "candidates")] == ["paper"]
     assert float(table(page, "candidates_timings")[0]["us per decision"]) > 0.0
 
@@ -107,4 +93,4 @@ def test_features_learning_curve_and_prices_have_their_tables(written):
 def test_the_page_stands_alone(written):
     _, page = written
     assert 'src="http' not in page.read_text()
-    assert page.read_text().count("<h2>") == 5 + len(written[0].chosen) - 1
+    assert page.read_text().count("<h2>") == 4 + len(written[0].chosen) - 1

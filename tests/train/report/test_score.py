@@ -7,14 +7,11 @@ import pytest
 from edge.decide.statistics import paired as in_shares
 from tests.train.choose.test_evaluate import trials
 from train.choose.crossval import accuracies, neighbours
-from train.choose.search import SearchGrid
-from train.data.folds import stratified_folds
 from train.report.score import (
     Result,
     grid_search,
     interval,
     majority,
-    nested,
     paired,
     points,
     score,
@@ -30,14 +27,6 @@ def test_the_best_cell_is_reported_with_its_answers():
     table = accuracies(neighbours(vectors.X, features=ONE), y)
     assert best.accuracy == table.max() == table[best.components - 1, best.k - 1]
     assert best.right == int((best.answers == y).sum())
-
-
-def test_nested_accuracy_of_clear_classes_is_one():
-    y = np.array(["a", "b", "c"] * 20)
-    X = np.tile([[1.0], [2.0], [4.0]], (20, 30))
-    options = {"grid": SearchGrid("IV"), "features": ONE}
-    result = nested(X, {"t": y}, stratified_folds(y), **options)["t"]
-    assert result == Result(60, 60, components=1, k=1)
 
 
 def test_a_result_has_the_same_columns_whether_a_grid_was_searched_or_not():

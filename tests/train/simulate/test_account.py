@@ -1,28 +1,11 @@
 """What `--explain` says that effects cost adds up to the run."""
 
-import pytest
-
 from tests.conftest import ROOT
-from tests.train.simulate.scenes import make, one_object
-from train.simulate.account import costs
 from train.simulate.convergence import kinds, measure
 from train.simulate.plan import given_steps
 from train.simulate.scene import load
 
 SCENES = ROOT / "train" / "scenes"
-
-
-def test_the_parts_of_all_trials_add_up_to_the_run():
-    """Of two kinds, one of which shares work among its effects."""
-    box = one_object(name="box")
-    scene = make(one_object(family="foam") + box, "inertia", after_s=0.2)
-    spent = costs(scene, [spec for specs in kinds(scene).values() for spec in specs])
-    together = sum(
-        len(specs) * sum(spent.of(effects).values())
-        for effects, specs in kinds(scene).items()
-    )
-    assert spent.trials == 4
-    assert together == pytest.approx(spent.seconds, rel=1e-9)
 
 
 def test_a_scene_says_why_its_steps_are_not_measured(tmp_path):

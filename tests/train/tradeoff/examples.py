@@ -5,12 +5,12 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from train.choose.evaluate import Promise
+from train.choose.evaluate import NestedAccuracy
 from train.choose.settings import Chosen
 from train.model.pipeline import Choice
 from train.tradeoff.commands import Commands
-from train.tradeoff.early import Certified
-from train.tradeoff.measured import Measured
+from train.tradeoff.early import EarlyDecisions
+from train.tradeoff.measured import Measurements
 
 BUILD = Path("build/tradeoff")
 
@@ -20,11 +20,11 @@ def chosen(right, unseen=None, of=100):
     where these were left out."""
 
     def result(count):
-        return Promise(count, of, hits=np.arange(of) < count)
+        return NestedAccuracy(count, of, hits=np.arange(of) < count)
 
-    left_out = "trial" if unseen is None else "object"
+    held_out = "trial" if unseen is None else "object"
     accuracy = result(right if unseen is None else unseen)
-    return Chosen(Choice("IV", 1, 1), accuracy, result(right), left_out)
+    return Chosen(Choice("IV", 1, 1), accuracy, result(right), held_out)
 
 
 def rule(error=0.1, right=95, mean_s=0.5, unseen=None):
@@ -34,7 +34,7 @@ def rule(error=0.1, right=95, mean_s=0.5, unseen=None):
     def hits(count):
         return None if count is None else np.arange(100) < count
 
-    return Certified(error, mean_s, hits(right), hits(right), hits(unseen))
+    return EarlyDecisions(error, mean_s, hits(right), hits(right), hits(unseen))
 
 
 def measured(points, certified, **changes):
@@ -45,7 +45,7 @@ def measured(points, certified, **changes):
         "certified": certified,
         "costs": [],
         "board": SimpleNamespace(arithmetic_s=0.0, name="a board"),
-        "commands": Commands(("mine",), Path("a.npz"), BUILD, BUILD / "board.json"),
+        "commands": Commands(("mine",), Path("a.npz"), BUILD),
         "wire_s": 0.0,
     }
-    return Measured(**{**facts, **changes})
+    return Measurements(**{**facts, **changes})

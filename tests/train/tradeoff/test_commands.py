@@ -6,11 +6,10 @@ from pathlib import Path
 from train.tradeoff.commands import PROGRAM, Commands
 
 BUILD = Path("build/tradeoff")
-COST = "--cost wrong=10,second=1"
 
 
 def commands(*data, out=BUILD, **facts):
-    return Commands(data, Path("a b.npz"), out, out / "board.json", **facts)
+    return Commands(data, Path("a b.npz"), out, **facts)
 
 
 def test_a_model_of_a_window():
@@ -33,11 +32,4 @@ def test_a_point_of_the_front():
 def test_an_early_decision_on_a_recording():
     assert commands("mine").run(0.1) == (
         f"{PROGRAM} run --model build/model.onnx --error 0.1 --fake 'a b.npz'"
-    )
-
-
-def test_the_report_again_with_the_options_that_it_was_made_with():
-    assert commands("mine", quick=True, task="object").tradeoff(COST) == (
-        f"{PROGRAM} tradeoff --data mine --board build/tradeoff/board.json "
-        f"--out build/tradeoff --quick --task object {COST}"
     )

@@ -1,8 +1,6 @@
-"""Every figure of the first screen beside a command: what this command makes, typed in
-a shell that knows nothing of the environment, keeps to it on fresh simulated touches."""
+"""Every figure of the report beside a command: what this command makes, typed in a
+shell that knows nothing of the environment, keeps to it on fresh simulated touches."""
 
-import html
-import json
 import re
 import shlex
 import subprocess
@@ -17,14 +15,13 @@ import pytest
 from edge.app.commands.replay import decide
 from edge.decide.model import Model
 from edge.record.recording import load
-from tests.conftest import ROOT
+from tests.conftest import ROOT, rows_of
 from tests.train.tradeoff.test_tradeoff import board_file
 from train.data.dataset import read
 from train.simulate import scene as scenes
 from train.simulate.run import write
 from train.tradeoff import costs
 from train.tradeoff import run as running
-from train.tradeoff.front import NAMES
 from train.tradeoff.run import Options
 
 SCENE = ROOT / "train" / "scenes" / "cody18.toml"
@@ -32,70 +29,60 @@ SEED = 4711
 FRESH_SEED = 4712
 FRESH = 6
 """Touches of each object in each condition."""
-ROW = re.compile("<tr><td>(.*?)</td><td>(.*?)</td><td>(.*?)</td></tr>")
-CODE = re.compile("<code>(.*?)</code>")
-SHARE = re.compile(r"(\d+) % \((\d+) to (\d+)\)")
-MEAN_S = re.compile(r"([\d.]+) s on average")
+CODE = re.compile("`(.*?)`")
 NEAR_S = 0.08
 """So far a mean time may be from that which is promised."""
 
 
 @dataclass(frozen=True)
 class Promised:
-    """A figure of the report.
+    """A row of the report.
 
     Attributes:
         task: that it is about.
-        text: the accuracy with its interval, and the mean time of early decisions.
+        low, high: ends of the interval of its accuracy, in percent.
+        mean_s: seconds to the decision.
         commands: that make it.
     """
 
     task: str
-    text: str
+    low: float
+    high: float
+    mean_s: float
     commands: tuple[str, ...]
 
-    def kept(self, right, seconds):
-        """Whether decisions (n,) of fresh touches lie within the printed interval,
-        whose ends are rounded; early ones also within the error that is asked for, and
-        near the mean time."""
-        _, low, high = map(float, SHARE.search(self.text).groups())
-        inside = low - 0.5 <= 100 * right.mean() <= high + 0.5
-        mean_s = MEAN_S.search(self.text)
-        if mean_s is None:
+    def holds(self, right, seconds):
+        """Whether decisions (n,) of fresh touches lie within the interval; early ones
+        also within the error that is asked for, and near the mean time."""
+        inside = self.low <= 100 * right.mean() <= self.high
+        if self.error is None:
             return inside
-        near = abs(seconds.mean() - float(mean_s[1])) <= NEAR_S
+        near = abs(seconds.mean() - self.mean_s) <= NEAR_S
         return inside and near and right.mean() >= 1.0 - self.error
 
     @property
     def error(self):
         """The error that early decisions are asked for; None of others."""
         run = re.search(r"--error (\S+)", self.commands[-1])
-        return run and float(run[1])
+        return float(run[1]) if run else None
 
 
 def promised(report):
-    """The figures of the first screen: at each place of both sliders, of the names of
-    the front, and of the cheapest use."""
-    text = report.read_text()
-    data = json.loads(html.unescape(re.search('data-answers="(.*?)"', text)[1]))
-    (table,) = re.findall('<table class="fronts">(.*?)</table>', text, re.DOTALL)
-    figures = set()
-    for name, answer, codes in ROW.findall("".join([*data["reached"], table])):
-        commands = tuple(map(html.unescape, CODE.findall(codes)))
-        if commands:
-            task = name if name in data["names"] else answer.split(":")[0]
-            figures.add(Promised(task, answer, commands))
-    for task, answers in zip(data["names"], data["tasks"], strict=True):
-        for answer, command in zip(answers, data["commands"], strict=True):
-            shown = f"{answer['share']} {answer['interval']}"
-            figures.add(Promised(task, shown, (command,)))
+    """The figures of the report that have a command."""
+    figures = []
+    for path in sorted(report.parent.glob("answer_*.csv")):
+        task = path.stem.removeprefix("answer_")
+        for row in rows_of(path):
+            ends = float(row["from %"]), float(row["to %"])
+            commands = tuple(CODE.findall(row["command"]))
+            if commands:
+                figures.append(Promised(task, *ends, float(row["time s"]), commands))
     return figures
 
 
 @pytest.fixture(scope="module")
 def folders(tmp_path_factory):
-    """A quick report without the savings, which the first screen does not show, and
-    fresh touches of the same objects."""
+    """A quick report without the savings, and fresh touches of the same objects."""
     folder = tmp_path_factory.mktemp("promises")
     data = str(folder / "data")
     write(scenes.load(SCENE, seed=SEED), data)
@@ -145,23 +132,15 @@ def decisions(commands, error, fresh):
 
 
 @pytest.mark.slow
-def test_what_each_command_of_the_first_screen_makes_keeps_to_its_figures(folders):
+def test_what_each_command_of_the_report_makes_keeps_to_its_figures(folders):
     """Nineteen of twenty intervals hold; of so many figures of the same touches, nine
     of ten."""
     figures = sorted(promised(folders.report), key=lambda figure: figure.commands)
-    assert {
-        name for f in figures for name in NAMES if f"--front {name}" in f.commands[0]
-    } == {*NAMES}
     assert any(figure.error for figure in figures)
-    (again,) = re.findall(
-        r"<code>([^<]* tradeoff [^<]*)</code>", folders.report.read_text()
-    )
-    type_in(f"{html.unescape(again)} --check")
     broken = []
     for figure in figures:
-        right, seconds = decisions(figure.commands, figure.error, folders.fresh)[
-            figure.task
-        ]
-        if not figure.kept(right, seconds):
+        answers = decisions(figure.commands, figure.error, folders.fresh)
+        right, seconds = answers[figure.task]
+        if not figure.holds(right, seconds):
             broken.append((figure, right.mean(), seconds.mean()))
     assert len(broken) <= len(figures) / 10, broken

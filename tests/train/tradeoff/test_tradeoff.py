@@ -1,6 +1,5 @@
 """The trade-off: boards, nested accuracy, points, and early decisions."""
 
-import argparse
 import json
 from dataclasses import replace
 from functools import partial
@@ -16,15 +15,13 @@ from edge.decide.statistics import wilson
 from edge.errors import InputError
 from edge.record.recording import load
 from edge.record.saving import save
-from edge.touch.layout import SkinLayout
 from export.__main__ import main
 from tests import browser
 from tests.conftest import export, rows_of, save_touches
 from tests.train.tradeoff.examples import chosen, measured, rule
-from train.commands.tradeoff import cost
-from train.data.dataset import Recordings, read
+from train.data.dataset import read
 from train.data.parts import part
-from train.model.rules import NEVER, Course
+from train.model.rules import NEVER, TimeSeries
 from train.report.work import Workers
 from train.tradeoff import answer, board, choices, costs, early
 from train.tradeoff import run as running
@@ -130,9 +127,7 @@ class TestCosts:
             "the paper's features",
         ]
         assert cases["24 taxels"].source.recordings[0].frames.shape[1:] == (4, 6)
-        assert (
-            cases["50 frames a second"].price == "AD7147, 2 buses at 400 kHz are enough"
-        )
+        assert cases["24 taxels"].price == "24 of 384 taxels to read"
 
     def test_the_choice_among_all_candidates_is_not_made_twice(self, monkeypatch):
         """Of four trials the quick choice has two right and the full one three."""
@@ -154,59 +149,12 @@ class TestCosts:
         assert row["t, points"].startswith("+25 (")
         assert names == ["the quick choice"]
 
-    @pytest.mark.parametrize(
-        ("side", "place"), [(16, "1 bus of AD7147"), (40, "a microcontroller")]
-    )
-    def test_a_skin_of_any_size_tells_by_how_much_larger_taxels_shorten_a_frame(
-        self,
-        side,
-        place,
-    ):
-        raw = Recordings((), (), "")
-        first, *_ = costs._fewer_taxels(raw, SkinLayout(rows=side, cols=side))
-        assert first.name == f"{side**2 // 4} taxels"
-        assert first.price.endswith(f"ms shorter on {place}")
 
-
-def test_prices_are_two_numbers():
-    prices = "wrong=1,second=1"
-    assert cost("second=0,wrong=2.5") == (2.5, 0.0)
-    for text in (
-        "wrong=10",
-        "wrong=-1,second=1",
-        "wrong=inf,second=1",
-        f"{prices},x=1",
-    ):
-        with pytest.raises(argparse.ArgumentTypeError, match="like wrong=10,second=1"):
-            cost(text)
-
-
-def test_the_dearer_an_error_the_longer_it_pays_to_wait():
-    """Errors fall by 40 of 100 for 0.4 s, then by 5 for 0.4 s more."""
-    shares = {0.4: 50, 0.8: 90, 1.2: 95}
-    points = {w: {"t": chosen(share)} for w, share in shares.items()}
-    best = []
-    for wrong in (0.5, 2.0, 10.0):
-        fixed = measured(points, {"t": []}, wrong=wrong, second=1.0)
-        best.append(answer.prices(fixed).tables[0].rows[0]["best use"])
-    assert best == ["after 0.4 s", "after 0.8 s", "after 1.2 s"]
-
-
-def test_the_cheapest_use_may_be_early_and_its_price_has_an_interval():
-    decisions = rule(right=94, mean_s=0.6)
-    early_or_late = measured(
-        {1.2: {"t": chosen(95)}},
-        {"t": [decisions]},
-        wrong=10.0,
-        second=1.0,
-    )
-    (row,) = answer.prices(early_or_late).tables[0].rows
-    assert row["best use"] == "early, at most 10% wrong"
-    assert row["mean price"] == 1.2  # 10 times 6 %, and 0.6 s
-    low, high = decisions.result.interval
-    ends = [round(10.0 * (1.0 - share) + 0.6, 2) for share in (high, low)]
-    assert row["95 % interval"] == f"{ends[0]:g} to {ends[1]:g}"
-    assert "run --model build/model.onnx --error 0.1" in row["command"]
+def test_the_wire_is_that_of_the_recordings_or_unknown(make_touch):
+    touch = make_touch()
+    assert running._wire_time_s([touch], 100.0) is None
+    wired = replace(touch, meta={**touch.meta, "wire_s": 0.0182})
+    assert running._wire_time_s([wired], 100.0) == pytest.approx(0.0232)
 
 
 def test_each_decision_has_its_accuracy_on_unseen_objects_and_the_time_of_the_touch():
@@ -232,9 +180,11 @@ class TestEarly:
         all others for another."""
         wrong = np.array([[True, False, False, False], [False] * 4])
         unknown = np.array([[False] * 4, [True, False, False, False]])
-        course = Course([np.full((2, 4), 0.5)], [wrong], unknown, withheld=unknown)
-        known = early.LeftOut(~wrong, course)
-        unseen = early.LeftOut(~wrong, replace(course, withheld=None))
+        time_series = TimeSeries(
+            [np.full((2, 4), 0.5)], [wrong], unknown, withheld=unknown
+        )
+        known = early.HeldOutDecisions(~wrong, time_series)
+        unseen = early.HeldOutDecisions(~wrong, replace(time_series, withheld=None))
         rules = StoppingRule(0.12, 1.2, NEVER, 1), StoppingRule(0.2, 0.6, 0.5, 1)
         stopping = Stopping((), (), (), 0.0, 0.0, 0.0, rules, 4, 0, 0.1)
         late, soon = early.at_errors(stopping, known, unseen)

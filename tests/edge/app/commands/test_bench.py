@@ -13,7 +13,7 @@ from edge.app.cli import main
 from edge.app.commands import bench
 from edge.app.commands.bench import summary, touch
 from edge.errors import InputError
-from edge.touch.first_contact import first_contact
+from edge.touch.track import first_contact
 
 
 @pytest.fixture(scope="module")

@@ -5,8 +5,7 @@ import pytest
 
 from edge import demo
 from edge.record.recording import load
-from edge.touch.first_contact import first_contact
-from edge.touch.track import ContactTracker
+from edge.touch.track import ContactTracker, first_contact
 from edge.wire.fake import touches
 from edge.wire.skin import file as skinfile
 from edge.wire.skin.file import parse

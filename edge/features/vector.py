@@ -1,0 +1,212 @@
+"""A contact's series to the vector that is classified (paper, section III-B)."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cache, partial
+from itertools import groupby
+
+import numpy as np
+
+from edge.arrays import Array, Floats
+from edge.errors import InputError
+from edge.features import kernels, transforms
+from edge.features.kernels import KernelTable
+from edge.features.names import PAPER, Feature, feature_types, not_measured
+from edge.features.zones import ZoneSeries
+from edge.touch.contact import FeatureSeries
+from edge.touch.layout import SkinLayout
+
+FEATURES = PAPER
+SAMPLES = 40
+WINDOW_S = 1.2
+
+
+def widths(
+    names: Sequence[str],
+    samples: int,
+    layout: SkinLayout,
+    joints: int = 0,
+) -> tuple[int, ...]:
+    """How many values of a vector each feature takes, in their order.
+
+    A course takes `samples` values, or as many as its name says, for each cell or
+    joint. A feature that is one number for the window takes 1 for each.
+
+    Args:
+        names: of the features.
+        samples: times per feature.
+        layout: the skin.
+        joints: joint angles of a frame.
+
+    Raises:
+        InputError: a feature does not exist.
+    """
+    lengths = []
+    for feature in feature_types(names):
+        quantity = feature.quantity
+        length = quantity.kernels or feature.samples or samples
+        if feature.summary not in ("", "rate"):
+            length = 1  # one number for the window
+        if quantity.of_joints:
+            length *= joints
+        elif quantity.cells and not quantity.kernels:
+            length *= quantity.cells(layout).width
+        lengths.append(length)
+    return tuple(lengths)
+
+
+def feature_vector(
+    series: FeatureSeries,
+    window_s: float,
+    samples: int = SAMPLES,
+    features: Sequence[str] = FEATURES,
+    tables: Mapping[str, KernelTable] | None = None,
+) -> Floats:
+    """The features of the window from onset to onset + window, one after another.
+
+    >>> import edge
+    >>> from edge import demo
+    >>> from edge.touch.track import ContactTracker, first_contact
+    >>> recording = edge.load(demo.FOLDER / "pillow-movable.npz")
+    >>> onset_s, series = first_contact(recording, ContactTracker(recording.layout))
+    >>> edge.feature_vector(series, window_s=1.2).shape
+    (120,)
+
+    A course is sampled at `samples` times, or as many as its name says, uniform in the
+    window. Cells and joints follow one after another; see `widths`. Samples are
+    interpolated linearly between frames, so jitter and dropped frames do not shift
+    them. A value that is not known in some frames is interpolated between those that
+    know it, held after the last of them, and 0 where no frame knows it. Such values are
+    the centroid of an empty zone, motion without the arm's pose, and everything while
+    the contact has lifted off for less than `release_s`. Force and area of a contact
+    that has ended are 0 from its lift-off on. Frames after the first one at the
+    window's end do not count, as the board does not have them yet.
+
+    Transforms and summaries are taken of the samples. `log_` is the logarithm of the
+    value plus a floor, so that it stays finite at 0. The floor is the smallest force of
+    a taxel in contact, one taxel, or a tenth of the distance between taxels; it is 1
+    after another transform. A stiffness is above 0 and needs no floor; where no frame
+    knows it, its logarithm is 0 too.
+
+    Args:
+        series: the contact.
+        window_s: seconds from onset, above 0.
+        samples: times per feature, at least 2.
+        features: names, see `edge.features.names`; the series must have been measured
+            for them.
+        tables: {feature: its table} of those that are made of kernels.
+
+    Returns:
+        (sum of `widths`,) float64: by default max_force in newtons (or counts),
+        contact_area in taxels, contact_motion in metres (or taxels), each at `samples`
+        times.
+
+    Raises:
+        InputError: the window or the number of samples makes no sense, the series is
+            empty, a feature does not exist or was not measured, or its table is
+            missing.
+    """
+    if not (math.isfinite(window_s) and window_s > 0.0):
+        raise InputError(f"the window must be above 0 seconds, not {window_s!r}")
+    if samples < 2:
+        raise InputError(f"a feature needs at least 2 samples, not {samples!r}")
+    types = feature_types(features)
+    series = series.felt(window_s)
+    if series.t.size == 0:
+        raise InputError("the contact has no frame")
+    zones = cache(partial(ZoneSeries, series))
+    course = _Course(series, window_s, tables or {}, zones)
+    # What is too large for a float is refused by the model.
+    with np.errstate(all="ignore"):
+        groups = [tuple(group) for _, group in groupby(types, key=_kind)]
+        return np.concatenate([course.block(group, samples) for group in groups])
+
+
+def _kind(feature: Feature) -> tuple[str, int, tuple[str, ...], str]:
+    """The kind of a feature: those of one kind are the rows of one array."""
+    name = feature.name if feature.quantity.wide else ""
+    return name, feature.samples, feature.transforms, feature.summary
+
+
+@dataclass
+class _Course:
+    """The measurements of a contact, sampled at times of its window."""
+
+    series: FeatureSeries
+    window_s: float
+    tables: Mapping[str, KernelTable]
+    zones: Callable[[str], ZoneSeries]
+
+    def block(self, group: tuple[Feature, ...], samples: int) -> Floats:
+        """Values of features of one kind, one after another."""
+        first = group[0]
+        if first.quantity.kernels:
+            return kernels.shares_of(
+                self.series,
+                self.window_s,
+                first.name,
+                self.tables,
+            )
+        samples = first.samples or samples
+        step = self.window_s / (samples - 1)
+        values = self._sampled(group, np.arange(samples, dtype=np.float64) * step)
+        if first.transforms or first.summary:
+            values = transforms.transformed(values, group, self.series.layout)
+            values = transforms.summarised(values, first.summary, step)
+        return values.reshape(-1)
+
+    def _sampled(
+        self,
+        group: tuple[Feature, ...],
+        times: Floats,
+    ) -> Floats:
+        """(rows, times) features of one value a frame, or of one wide feature."""
+        first = group[0]
+        t = self.series.t
+        if first.quantity.wide:
+            values = self._measured(first).T
+        else:
+            values = np.array(list(map(self._measured, group)), dtype=np.float64)
+        valid = ~np.isnan(values)
+        complete = valid.all(axis=1)
+        sampled = np.zeros((len(values), len(times)))
+        sampled[complete] = _resample(times, t, values[complete])
+        for i in np.flatnonzero(~complete & valid.any(axis=1)):
+            sampled[i] = _resample(times, t[valid[i]], values[i, valid[i]])
+        if first.quantity.cells:
+            return sampled / self.zones(first.zone).scale
+        is_change = first.quantity.name == "joint_change"
+        return sampled - sampled[:, :1] if is_change else sampled
+
+    def _measured(self, feature: Feature) -> Array:
+        """(n,) or (n, values) of a feature in every frame; NaN where it cannot be
+        known."""
+        values = None
+        if self.series.zones.keys() >= set(feature.zones):
+            values = feature.quantity.measure(self.zones(feature.zone))
+        if values is None:
+            raise not_measured(feature.name)
+        return values
+
+
+def _resample(
+    times: Floats,
+    t: Floats,
+    values: Array,
+) -> Floats:
+    """Values (..., n) at the increasing times `t`, interpolated to `times`.
+
+    They never overshoot their neighbours. The fraction of a step is computed before it
+    multiplies a difference of values, as a slope over a very short step could overflow.
+    """
+    after = np.clip(t.searchsorted(times, side="right"), 1, t.size - 1)
+    before = np.maximum(after - 1, 0)
+    step = t[after] - t[before]
+    step[step == 0.0] = 1.0  # of a single frame
+    fraction = np.clip((times - t[before]) / step, 0.0, 1.0)
+    low = values.take(before, axis=-1)
+    high = values.take(after, axis=-1)
+    return np.asarray(np.where(fraction == 1.0, high, low + fraction * (high - low)))

@@ -1,0 +1,216 @@
+"""The whole numbers of the zones of a skin in a frame, and what quantities make of
+them.
+
+Zones: `contact` is the region that is followed, `skin` all active taxels, `left` and
+`right` the active taxels in the first and second half of the columns (the two pads of a
+hand, the two sides of a forearm). Centroids and spreads are weighted by force. A skin of
+three axes gives each taxel's force along the rows (elbow to wrist) and around the
+columns too, in the counts of its normal force.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from edge.arrays import Array, Booleans, Floats, Integers
+from edge.touch.contact import FeatureSeries
+from edge.touch.grid import best_cut
+from edge.touch.layout import SkinLayout
+from edge.touch.region import ActiveTaxels, Region
+
+ZONES = ("contact", "skin", "left", "right")
+ZONE_WIDTH = 8
+"""Whole numbers of a zone, in this order: largest count, taxels, sum of counts, and the
+sums of counts times row, column, row squared, row times column, column squared."""
+SHEAR_WIDTH = 2
+"""Whole numbers of a zone's shear: the sums of both components. They stand behind the
+zone's other numbers."""
+
+
+class Zones:
+    """The zones that some features need.
+
+    Attributes:
+        names: of the zones, in the order of `ZONES`.
+        width: whole numbers of a zone, those of its shear included.
+    """
+
+    def __init__(self, layout: SkinLayout, names: Sequence[str], shear: bool) -> None:
+        self.names = names
+        self.width = ZONE_WIDTH + SHEAR_WIDTH * shear
+        self._wraps = layout.wraps
+        half = layout.cols // 2
+        self._halves = {"left": slice(0, half), "right": slice(half, layout.cols)}
+        rows = np.arange(layout.rows)
+        cols = np.arange(layout.cols)
+        self._rows = np.stack([rows**0, rows, rows**2])
+        # Columns as counted from each cut of the circle, and their squares.
+        turned = np.where(cols < cols[:, None], cols + layout.cols, cols)
+        self._cols = np.stack([turned**0, turned, turned**2], axis=2)
+
+    def measure(
+        self,
+        active: ActiveTaxels,
+        contact: Region | None,
+        shear: NDArray[np.int16] | None,
+    ) -> list[int]:
+        """`width` whole numbers of each zone.
+
+        Args:
+            active: the frame's active taxels.
+            contact: the region followed; None where no taxel of it is active.
+            shear: (rows, cols, 2) of the frame, where a feature needs it.
+        """
+        if contact is None:
+            return [0] * (self.width * len(self.names))
+        row: list[int] = []
+        for zone in self.names:
+            half = self._halves.get(zone, slice(None))
+            mask = contact.mask if zone == "contact" else active.mask
+            counts = (active.counts * mask)[:, half]
+            # Of each column: counts, times row, times row squared.
+            lines = self._rows @ counts
+            closed = self._wraps and zone not in self._halves
+            cut = best_cut(lines[0].tolist()) if closed else 0
+            (force, cols, cols_cols), (rows, rows_cols, _), (rows_rows, *_) = (
+                lines @ self._cols[cut, half]
+            ).tolist()
+            row += int(counts.max(initial=0)), int(np.count_nonzero(counts))
+            row += force, rows, cols, rows_rows, rows_cols, cols_cols
+            if self.width > ZONE_WIDTH:
+                assert shear is not None
+                row += _shear_sums(shear[:, half], mask[:, half])
+        return row
+
+    def split(self, rows: Integers) -> dict[str, Integers]:
+        """{zone: (n, width)} of the numbers (n, zones * width) of frames."""
+        return dict(
+            zip(self.names, np.split(rows, len(self.names), axis=1), strict=True)
+        )
+
+
+def _shear_sums(shear: NDArray[np.int16], mask: Booleans) -> list[int]:
+    """The `SHEAR_WIDTH` whole numbers of a zone, from its shear and its active
+    taxels."""
+    touched = shear * mask[..., None]
+    return list(map(int, touched.sum(axis=(0, 1), dtype=np.int64)))
+
+
+@dataclass(frozen=True)
+class ZoneSeries:
+    """The numbers of a zone in the frames of a contact.
+
+    The centroid of an empty zone is NaN, everything else of it 0.
+    """
+
+    series: FeatureSeries
+    zone: str
+
+    @property
+    def scale(self) -> float:
+        """Counts per newton, or 1."""
+        return self.series.layout.counts_per_newton or 1.0
+
+    @property
+    def sums(self) -> Integers:
+        """(n, width) whole numbers."""
+        return self.series.zones[self.zone]
+
+    @property
+    def peak(self) -> Array:
+        """(n,) the largest count."""
+        return self.sums[:, 0]
+
+    @property
+    def area(self) -> Array:
+        """(n,) number of active taxels."""
+        return self.sums[:, 1]
+
+    @property
+    def taxels(self) -> Array:
+        """(n,) the same as a divisor: at least 1."""
+        return np.maximum(self.area, 1)
+
+    @property
+    def force(self) -> Array:
+        """(n,) sum of counts."""
+        return self.sums[:, 2]
+
+    @property
+    def along(self) -> Floats:
+        """(n,) row of the centroid."""
+        return self._over_force(self.sums[:, 3], np.nan)
+
+    @property
+    def around(self) -> Floats:
+        """(n,) column of the centroid."""
+        around = self._over_force(self.sums[:, 4], np.nan)
+        if self.series.layout.wraps:
+            # A contact that crosses the seam goes on; it does not jump to the other
+            # end.
+            turn = self.series.layout.cols
+            touched = self.force > 0
+            around[touched] = np.unwrap(around[touched] % turn, period=turn)
+        return around
+
+    def _over_force(self, values: Array, empty: float) -> Floats:
+        shares = np.full(len(values), empty)
+        np.divide(values, self.force, out=shares, where=self.force > 0)
+        return shares
+
+    @cached_property
+    def spreads(self) -> Floats:
+        """(5, n) standard deviations of rows and of columns, their covariance, standard
+        deviations along the longer and the shorter principal axis."""
+        # Variances and the covariance are whole numbers times force squared, so nothing
+        # cancels. Products beyond 64 bits, of large skins, take Python's integers.
+        sums = self.sums[:, :ZONE_WIDTH]
+        bound = int(sums.max(initial=0)) * int(self.force.max(initial=0))
+        exact = sums if bound < 1 << 62 else sums.astype(object)
+        _, _, f, r, c, rr, rc, cc = exact.T
+        total = np.maximum(self.force, 1).astype(np.float64)
+        rows, cols, slant = (
+            (f * products - a * b).astype(np.float64) / total / total
+            for products, a, b in ((rr, r, r), (cc, c, c), (rc, r, c))
+        )
+        across = rows - cols
+        larger = 0.5 * (rows + cols + np.sqrt(across * across + 4.0 * slant * slant))
+        # The smaller eigenvalue is the determinant over the larger one: the difference
+        # of the eigenvalues' terms would cancel. For a perfect line, rounding leaves
+        # less than 2^-25 of the skin's larger side.
+        determinant = np.maximum(rows * cols - slant * slant, 0.0)
+        smaller = np.divide(
+            determinant,
+            larger,
+            out=np.zeros_like(larger),
+            where=larger > 0,
+        )
+        along, around, longer, shorter = np.sqrt([rows, cols, larger, smaller])
+        return np.stack([along, around, slant, longer, shorter])
+
+    @property
+    def channels(self) -> Integers | None:
+        """(n, channels) whole numbers of all zones; None where one was not measured."""
+        zones = [sums[:, :ZONE_WIDTH] for sums in self.series.zones.values()]
+        return np.column_stack(zones) if len(zones) == len(ZONES) else None
+
+    @property
+    def shear(self) -> Integers:
+        """(2, n) sums of the shear along the rows and around the columns."""
+        return self.sums.T[-SHEAR_WIDTH:]
+
+    @property
+    def shear_size(self) -> Floats:
+        """(n,) length of the sum of the taxels' shear."""
+        along, around = self.shear.astype(np.float64)
+        return np.asarray(np.sqrt(along**2 + around**2))
+
+    @property
+    def shear_ratio(self) -> Floats:
+        """(n,) that length over the normal force."""
+        return self._over_force(self.shear_size, 0.0)

@@ -1,0 +1,180 @@
+"""Thresholds, releases and windows that decisions gain from."""
+
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+import edge
+import train
+from edge.decide.classifier import Classifier
+from edge.decide.events import Onset
+from edge.record.recording import Recording
+from edge.record.saving import save
+from export.api import save as save_model
+from tests.train.data.test_thresholds import weaker
+from train.data.dataset import load_trials
+from train.tune import Levels, longer_release, tune, window, windows_of
+
+GIVEN = {"features": ["paper"], "decision_points_s": (), "quick": True, "jobs": 1}
+HZ = 50.0
+GAP = slice(25, 60)
+"""Frames without contact: 0.7 s from 0.5 s on."""
+
+
+def touch(label, seed, *, first=(300, 300), gap=GAP):
+    """A touch of 3 s that `soft` and `hard` things answer alike before the gap, but for
+    `first`, and by 200 and 600 counts after it."""
+    rng = np.random.default_rng(seed)
+    t = np.arange(150) / HZ
+    level = np.full(150, 200.0 if label == "soft" else 600.0)
+    level[: gap.start] = first[label == "hard"]
+    level[:10] = 0.0
+    level[gap] = 0.0
+    frames = np.zeros((150, 2, 3), dtype=np.uint16)
+    frames[:, 0, 1] = level * rng.uniform(0.9, 1.1, 150)
+    skin = {"rows": 2, "cols": 3, "threshold_counts": 30, "onset_counts": 45}
+    return Recording(t, frames, meta={"labels": {"object": label}, "skin": skin})
+
+
+@pytest.fixture
+def saved(tmp_path):
+    """The function that saves twelve touches to a folder."""
+
+    def save_all(**how):
+        for seed in range(12):
+            label = ("soft", "hard")[seed % 2]
+            save(tmp_path / f"{label}-{seed:02}.npz", touch(label, seed, **how))
+        return tmp_path
+
+    return save_all
+
+
+def test_a_contact_lasts_across_gaps_where_that_tells_more(saved, tmp_path):
+    fitted = train.fit(saved(), **GIVEN)
+    assert fitted.dataset.layout.release_s == 1.0
+    (note,) = [note for note in fitted.notes if "across gaps" in note]
+    assert "up to 1 s, as 12 of 12 touches are fragmented" in note
+
+
+def test_the_board_follows_a_contact_across_gaps_as_the_fit_did(saved, tmp_path):
+    save_model(tmp_path / "model.onnx", train.fit(saved(), **GIVEN))
+    classifier = Classifier(edge.Model(tmp_path / "model.onnx"))
+    began, decided, *others = classifier.classify(touch("hard", 100))
+    assert began.onset_s == 0.2
+    assert decided.label == "hard"
+    assert not any(isinstance(event, Onset) for event in others)
+    once = touch("soft", 101, gap=slice(90, 150))
+    *_, end = classifier.classify(once)
+    assert end.release_s == pytest.approx(89 / HZ + 1.0)
+
+
+def test_contacts_end_as_ever_where_the_first_piece_tells_as_much(saved):
+    fitted = train.fit(saved(first=(200, 600)), **GIVEN)
+    assert fitted.dataset.layout.release_s == 0.3
+    assert not any("across gaps" in note for note in fitted.notes)
+
+
+def test_a_release_that_is_asked_for_is_kept(saved):
+    fitted = train.fit(saved(), release=0.5, **GIVEN)
+    assert fitted.dataset.layout.release_s == 0.5
+
+
+OF_SKIN = Levels(None, None, None)
+
+
+def test_nothing_is_tried_where_touches_are_whole(saved):
+    dataset = load_trials([saved(gap=slice(140, 150))])
+    tried = longer_release(OF_SKIN, lambda _: dataset, pytest.fail)
+    assert tried == (OF_SKIN, [])
+
+
+def test_a_gain_counts_recordings_without_a_touch_too(saved):
+    touched = load_trials([saved()])
+    dataset = replace(touched, untouched=touched.unused)
+    accuracies = {None: 0.9, 1.0: 1.0, 3.0: 1.0}
+    levels, (note,) = longer_release(
+        OF_SKIN, lambda _: dataset, lambda levels: accuracies[levels.release_s]
+    )
+    assert levels.release_s == 1.0
+    assert "100.0% against 90.0% with 0.3 s" in note
+
+
+@pytest.mark.parametrize(
+    ("shares", "value"),
+    [
+        ([0.90, 0.92, 0.91], 0),  # within a standard error of 3 recordings
+        ([0.90, 0.97, 0.98], 1),  # one recording fewer than the best
+        ([0.90, 0.92, 0.98], 2),
+        ([1.00, 1.00, 1.00], 0),
+    ],
+)
+def test_the_first_value_about_as_good_as_the_best_is_taken(shares, value):
+    assert tune(range(3), shares.__getitem__, recordings=100).value == value
+    assert tune(range(3), shares.__getitem__).accuracy == max(shares)
+
+
+OF_FORTY = {1.2: 8, 2.4: 2, 4.8: 1}
+CHOOSING = SimpleNamespace(shares=lambda window_s: {"t": 1 - OF_FORTY[window_s] / 40})
+
+
+@pytest.mark.parametrize(
+    ("worth", "seconds"), [(0.0, 4.8), (0.005, 4.8), (0.02, 2.4), (0.2, 1.2)]
+)
+def test_a_window_is_worth_its_accuracy_less_its_wait(worth, seconds):
+    assert window(CHOOSING, tuple(OF_FORTY), worth)[0] == seconds
+
+
+def test_what_a_longer_window_gains_is_said_with_its_option():
+    _, (note, gain) = window(CHOOSING, tuple(OF_FORTY), 0.02)
+    assert note.startswith("the window is 2.4 s: a second of waiting counts as 2 point")
+    assert gain == "--window 4.8: t 98% instead of 95% in cross-validation"
+
+
+@pytest.mark.parametrize(
+    ("seconds", "windows"),
+    [
+        ([1.0] * 10, (1.2,)),
+        ([12.0] * 10, (1.2, 2.4, 4.8, 9.6, 12.0)),
+        ([3.0] * 8 + [10.0] * 2, (1.2, 2.4, 4.8, 9.6)),
+        ([1.0] * 6 + [10.0] * 4, (1.2,)),
+        ([1e4] * 10, (1.2, 2.4, 4.8, 9.6, 19.2, 38.4, 60.0)),
+    ],
+)
+def test_windows_reach_as_far_as_a_tenth_of_the_touches(seconds, windows):
+    assert windows_of(seconds) == pytest.approx(windows)
+
+
+def save_weak(folder, make_touch, **skin):
+    for seed in range(12):
+        touch = make_touch(kind=("hard", "soft")[seed % 2], seed=seed)
+        save(
+            folder / f"{seed:02}.npz", weaker(touch, 0.3 if seed % 3 else 0.08, **skin)
+        )
+    return str(folder)
+
+
+def test_lower_thresholds_are_taken_where_they_decide_better(make_touch, tmp_path):
+    high = {"threshold_counts": 150, "onset_counts": 200}
+    data = save_weak(tmp_path, make_touch, **high)
+    fitted = train.fit(data, **GIVEN)
+    assert fitted.dataset.layout.threshold_counts < 150
+    assert "recordings show no contact; in cross-validation" in fitted.notes[0]
+    assert not fitted.dataset.untouched
+
+
+def test_a_skin_saved_without_thresholds_gets_those_of_its_noise(make_touch, tmp_path):
+    data = save_weak(tmp_path, make_touch, threshold_counts=None, onset_counts=None)
+    fitted = train.fit(data, **GIVEN)
+    assert "warning: the skin was saved without thresholds" in fitted.notes[0]
+    assert all(trial.onset_s > trial.recording.t[0] for trial in fitted.dataset.trials)
+
+
+def test_an_export_without_a_contact_at_the_saved_thresholds_proposes_others(
+    make_touch, tmp_path
+):
+    folder = save_weak(tmp_path, make_touch, threshold_counts=39619, onset_counts=59000)
+    fitted = train.fit(folder, **GIVEN)
+    assert len(fitted.dataset.trials) == 12
+    assert any("no recording has a contact at its own" in note for note in fitted.notes)
