@@ -21,7 +21,6 @@ from train.model.stopping import FEWEST
 
 SECOND_WORTH = 0.005
 """Accuracy that is worth a second of waiting."""
-must be asked for."""
 DECISION_POINTS = "0.2:1.2:0.1"
 LONGEST_S = 60.0
 """Longest window, and longest time that a contact may be away."""
