@@ -246,7 +246,8 @@ def test_the_oldest_connection_of_an_address_without_the_token_makes_room(server
         server.show({"later": 1})
         received = b""
         while b"later" not in received:
-            assert (part := browser.recv(4096))
+            part = browser.recv(4096)
+            assert part
             received += part
 
 
