@@ -119,7 +119,8 @@ class AD7147(Chip):
     name = "ad7147"
     addresses = range(0x2C, 0x30)
     stages = STAGES
-    # The middle half of the converter's range (AD7147 data sheet).
+    # Our choice: the middle half of 16 bits, in which `REST` lies. Without an offset of
+    # its own, a taxel rests where its wiring puts it.
     usual_rest = (0x4000, 0xC000)
     fixed = SCRIPT
     frame_pointer = words((RESULTS,))

@@ -91,8 +91,9 @@ class MPR121(Chip):
     name = "mpr121"
     addresses = range(0x5A, 0x5E)
     stages = ELECTRODES
-    # The limits of its automatic configuration at 3.3 V, times four (AN3889).
-    usual_rest = (524, 804)
+    # The charging source is linear from 0.7 V to VDD - 0.7 V (data sheet); at 3.3 V, in
+    # steps of VDD / 1024.
+    usual_rest = (217, 806)
     fixed = SCRIPT
     frame_pointer = bytes([RESULTS])
 

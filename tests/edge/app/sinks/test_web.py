@@ -224,15 +224,31 @@ def test_one_address_has_eight_connections_with_the_token(server):
         assert stack.enter_context(ninth).recv(1) == b""
 
 
-def test_connections_without_the_token_make_room(server):
-    """The oldest is closed, and a browser is served."""
+def test_the_oldest_connection_of_an_address_without_the_token_makes_room(server):
+    """Neither the browser before it nor another address does."""
     with ExitStack() as stack:
-        strangers = connected(server, web.MOST_OF_ONE)
+        of_another = socket.create_connection(
+            place(server), PATIENCE_S, source_address=("127.0.0.2", 0)
+        )
+        stream = f"GET /events?token={server.token} HTTP/1.1\r\n\r\n".encode()
+        (browser,) = connected(server, 1, stream)
+        for connection in (of_another, browser):
+            stack.enter_context(connection)
+        assert b" 200 " in browser.recv(20)
+        strangers = connected(server, web.MOST_OF_ONE - 1)
         for stranger in strangers:
             stack.enter_context(stranger)
         request = f"GET /?token={server.token} HTTP/1.1\r\n\r\n".encode()
         assert b" 200 " in raw(server, request)
         assert strangers[0].recv(1) == b""
+        of_another.sendall(request)
+        assert b" 200 " in of_another.recv(20)
+        server.show({"later": 1})
+        received = b""
+        while b"later" not in received:
+            part = browser.recv(4096)
+            assert part
+            received += part
 
 
 @contextmanager
