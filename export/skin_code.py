@@ -40,13 +40,13 @@ UNREADABLE = 65535
 BAUD = 2_000_000
 SIZES = {"rows": "skin_rows", "cols": "skin_cols", "wraps": "skin_wraps"}
 """{attribute of a layout: its name in C}, where the model has the shorter one."""
-NUMBERS: tuple[tuple[Any, str], ...] = (
-    (retrying, "MOST_CREDIT RESTS"),
-    (bus_reader, "SET_UP_AFTER SET_UP_EVERY OLDEST_FRAMES"),
-    (lone, "FEWEST_NEIGHBOURS"),
-    (ad7147, "IDENTIFIED_EVERY"),
-    (calibrate, "FEWEST_FRAMES NOISY NOISY_COUNTS"),
-    (decoder, "COARSE"),
+NUMBERS: tuple[tuple[Any, tuple[str, ...]], ...] = (
+    (retrying, ("MOST_CREDIT", "RESTS")),
+    (bus_reader, ("SET_UP_AFTER", "SET_UP_EVERY", "OLDEST_FRAMES")),
+    (lone, ("FEWEST_NEIGHBOURS",)),
+    (ad7147, ("IDENTIFIED_EVERY",)),
+    (calibrate, ("FEWEST_FRAMES", "NOISY", "NOISY_COUNTS")),
+    (decoder, ("COARSE",)),
 )
 """Constants that have the same names in C."""
 
@@ -94,9 +94,7 @@ def _numbers(file: SkinFile, hz: int) -> dict[str, Any]:
     scale = 1 << decoder.SCALE_BITS
     answers = [len(step.answer) for chip in file.chips for step in steps(chip.script)]
     numbers = {
-        name: getattr(module, name)
-        for module, names in NUMBERS
-        for name in names.split()
+        name: getattr(module, name) for module, names in NUMBERS for name in names
     }
     kinds = {chip.kind.name for chip in file.chips}
     numbers |= {f"has_{name}": name in kinds for name in KINDS}

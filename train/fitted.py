@@ -19,7 +19,8 @@ class Fitted:
 
     Attributes:
         dataset: the trials it was fitted on, with the features that it takes.
-        measured: the same trials with the features of every candidate.
+        measured: the trials that the settings were chosen by, with the features of
+            every candidate.
         window_s: of the full decision.
         samples: values of a feature.
         X: (n, p) feature vectors at the full window.
@@ -49,12 +50,12 @@ class Fitted:
 
     @cached_property
     def _vectors(self) -> Vectors:
-        """The trials with the features of every candidate."""
+        """Those of `measured`."""
         return self.measured.vectors(self.window_s, self.samples, {})
 
     def selection(self, choices: Iterable[Choice]) -> tuple[DataSet, Vectors]:
-        """The trials, and their vectors, with the features and labels that some
-        settings of the tasks take."""
+        """The trials of `measured`, and their vectors, with the features and labels that
+        some settings of the tasks take."""
         tasks = set(self.chosen)
         features: list[str] = []
         for choice in choices:

@@ -63,18 +63,15 @@ def tune(
             gain less than a standard error or a single recording; where None, any gain
             counts.
     """
-    shares = [accuracy(value) for value in values]
-    first = shares[0]
-    best = max(shares)
-    place = shares.index(best)
+    shares = np.array([accuracy(value) for value in values])
+    first = float(shares[0])
+    place = int(shares.argmax())
     if recordings is not None:
-        error = float(np.sqrt(recordings * first * (1.0 - first)))
-        near = FEWEST_GAINED
-        if recordings * (best - first) <= max(error, near):
-            near = np.inf
-        gaps = [recordings * (best - share) for share in shares]
-        place = next(i for i, gap in enumerate(gaps) if gap <= near)
-    return Tuned(values[place], shares[place], first)
+        gaps = recordings * (shares.max() - shares)
+        error = np.sqrt(recordings * first * (1.0 - first))
+        stays = gaps[0] <= max(error, FEWEST_GAINED)
+        place = 0 if stays else int(np.argmax(gaps <= FEWEST_GAINED))
+    return Tuned(values[place], float(shares[place]), first)
 
 
 class Levels(NamedTuple):

@@ -80,7 +80,7 @@ def hard_cases(out, data):
     return [*steps, module("tests.checks.hard_cases")]
 
 
-def recordings(out, data):
+def remount(out, data):
     """The grasps of a real hand after it was taken off and put on; --data names their
     imported folders."""
     return [module("tests.checks.remount", "--recordings", *data)]
@@ -127,7 +127,7 @@ CHECKS = {
         module("tests.checks.mutants"),
         "Random changes to the skin, labels, page and C: whether each is noticed.",
     ),
-    "remount": recordings,
+    "remount": remount,
     "risk": Program(
         module("tests.checks.bench.risk"),
         "How often certified errors, mean times and FRONT's intervals are not kept.",

@@ -174,6 +174,27 @@ def test_a_pair_of_labels_that_was_never_met_has_no_name(tmp_path, monkeypatch):
 
 @pytest.mark.slow
 @needs_gcc
+def test_of_products_that_are_as_near_the_first_is_named(tmp_path):
+    """Each training touch stands under both labels of mobility."""
+    for i, recording in enumerate(pressed(touch, range(8))):
+        for mobility in ("by 0", "by 5"):
+            labels = {**recording.labels, "mobility": mobility}
+            labels["category"] = f"{labels['softness']}-{mobility}"
+            meta = {**recording.meta, "labels": labels}
+            path = tmp_path / "data" / f"{i:02d}-{mobility[-1]}.npz"
+            save(path, replace(recording, meta=meta))
+    words = ["--features", "contact", "--quick", "--window", "1.2"]
+    out = export(tmp_path / "out", "--data", tmp_path / "data", *words)
+    model = Model(out / "model.onnx")
+    touches = list(pressed(touch, range(30, 32)))
+    events = Classifier(model).classify(touches[0])
+    labels = {e.task: e.label for e in events if isinstance(e, Decided)}
+    assert labels["mobility"] == min(model.info.tasks["mobility"].labels)
+    assert_same(model, tmp_path / "c", touches)
+
+
+@pytest.mark.slow
+@needs_gcc
 def test_export_writes_a_program_that_reads_touches_as_text(early):
     model, touches = early
     folder = Path(model.path).parents[1] / "c"

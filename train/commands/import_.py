@@ -126,8 +126,6 @@ def write(
         try:
             _check_name(arguments.file, name, recordings)
         except InputError as error:
-            if getattr(arguments, "strict", True):
-                raise
             skipped.append(str(error))
             continue
         recordings[name] = recording

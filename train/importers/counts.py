@@ -2,8 +2,7 @@
 
 import logging
 import math
-import warnings
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Self
 
@@ -249,45 +248,51 @@ def _require_rest_at_zero(trials: Sequence[Samples]) -> None:
     Raises:
         InputError: they do; the sentence names the option that subtracts the rest.
     """
-    starts = np.array(
-        [trial.values[:START, :, 0] for trial in trials if len(trial.t) >= START]
-    )
-    if not len(starts):
+    starts = {
+        i: pd.DataFrame(trial.values[:START, :, 0])
+        for i, trial in enumerate(trials)
+        if len(trial.t) >= START
+    }
+    if not starts:
         return
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", RuntimeWarning)  # a taxel may lack all values
-        of_trials = np.nanmedian(starts, axis=1)
-        rest = np.nanmedian(of_trials, axis=0)
-        noise = np.nanmedian(abs(starts - of_trials[:, None]), axis=(0, 1))
-        drift = np.nanmedian(abs(of_trials - rest), axis=0)
-        level = float(np.nanmedian(rest))
-    moves = [trial.values[..., 0] - rest for trial in trials]
-    rise = max(np.fmax.reduce(move, axis=None, initial=0.0) for move in moves)
-    fall = -min(np.fmin.reduce(move, axis=None, initial=0.0) for move in moves)
+    frames = pd.concat(starts)
+    by_trial = frames.groupby(level=0)
+    of_trials = by_trial.median()
+    rest = of_trials.median()
+    level = float(rest.median())
+    noise = (frames - by_trial.transform("median")).abs().median()
+    drift = (of_trials - rest).abs().median()
     steady = (noise < NOISE * rest) & (drift < DRIFT * rest)
-    whole = np.array_equal(starts, np.rint(starts), equal_nan=True)
+    base = rest.to_numpy()[:, None]
+    rise = _rise(trial.values[..., :1] - base for trial in trials)
+    fall = _rise(base - trial.values[..., :1] for trial in trials)
+    whole = np.array_equal(frames, np.rint(frames), equal_nan=True)
     least = LEAST_REST if whole else 0.0
     if steady.mean() < 0.5 or level <= max(least, max(rise, fall) / OFFSET):
         return
-    how = "rise: add --signed"
-    if 2.0 * fall > rise:
-        how = (
-            "fall: add --falls" if fall > 2.0 * rise else "rise and fall: add --signed"
-        )
+    option = "--falls" if fall > 2.0 * rise else "--signed"
     raise InputError(
-        f"{trials[0].where}: values rest at {level:g} and {how}, which takes off the "
-        "rest; or add --counts, if the first frames are a touch"
+        f"{trials[0].where}: values rest at {level:g}, rise by {rise:g} and fall by "
+        f"{fall:g}: add {option}, which takes off the rest; or add --counts, if the "
+        "first frames are a touch"
     )
+
+
+def _rise(deviations: Iterable[NDArray[np.float64]]) -> float:
+    """The largest of some deviations that are not missing; 0 where all are below."""
+    highest = [np.fmax.reduce(d, axis=None, initial=0.0) for d in deviations]
+    return float(max(highest))
 
 
 def _moved(trials: Sequence[Samples], options: ValueOptions) -> Rest:
     """How values become counts that are told from those at rest; says which are lost."""
     rest = Rest(_quietest(trials, options), options.falls, options.scale)
-    deviations = [trial.values - rest.base for trial in trials]
-    rise = max(np.fmax.reduce(d, axis=None, initial=0.0) for d in deviations)
+    rise = _rise(trial.values - rest.base for trial in trials)
     if options.falls and rise > 0.0:
         say(f"values above those at rest, by up to {rise:g}, count as 0; see --signed")
-    return replace(rest, scale=_finest(deviations)) if rest.scale == 1.0 else rest
+    if rest.scale != 1.0:
+        return rest
+    return replace(rest, scale=_finest(trial.values - rest.base for trial in trials))
 
 
 def _lacking(trials: Sequence[Samples], rest: Rest, codes: Sequence[float]) -> str:
@@ -298,7 +303,7 @@ def _lacking(trials: Sequence[Samples], rest: Rest, codes: Sequence[float]) -> s
         for trial in trials
     ]
     finest = _finest(values)
-    if rest.values is None and any((v[..., 0] < 0.0).any() for v in values):
+    if rest.values is None and _rise(-v[..., 0] for v in values) > 0.0:
         words.append("--signed")
     elif finest != rest.scale:
         words.append(f"--scale {finest:g}")
@@ -350,19 +355,17 @@ def _quietest(trials: Sequence[Samples], options: ValueOptions) -> NDArray[np.fl
     return np.asarray(starts[first])
 
 
-def _finest(deviations: Sequence[NDArray[np.float64]]) -> float:
+def _finest(deviations: Iterable[NDArray[np.float64]]) -> float:
     """The counts a unit that make all deviations whole, or else use all counts."""
-    normal = max(_largest(d[..., :1]) for d in deviations)
-    shear = max(_largest(d[..., 1:]) for d in deviations)
-    largest = max(normal, shear * MOST_COUNTS / MOST_SHEAR)
-    for decimals in range(DECIMALS + 1):
-        scale = 10.0**decimals
-        if scale * largest > MOST_COUNTS:
-            break
-        errors = [_largest(d * scale - np.rint(d * scale)) for d in deviations]
-        if max(errors) < 1e-6 * scale:
-            return scale
-    return MOST_COUNTS / largest
+    scales = 10.0 ** np.arange(DECIMALS + 1)
+    errors = np.zeros(len(scales))
+    largest = 0.0
+    for d in deviations:
+        shear = _largest(d[..., 1:]) * MOST_COUNTS / MOST_SHEAR
+        largest = max(largest, _largest(d[..., :1]), shear)
+        errors = np.fmax(errors, [_largest(d * s - np.rint(d * s)) for s in scales])
+    suit = (errors < 1e-6 * scales) & (scales * largest <= MOST_COUNTS)
+    return float(scales[suit.argmax()]) if suit.any() else MOST_COUNTS / largest
 
 
 def _largest(values: NDArray[np.float64]) -> float:

@@ -88,14 +88,14 @@ def trials(
     Prints the columns used and ignored.
 
     Raises:
-        InputError: there is no file, or one cannot be used with `--strict`.
+        InputError: there is no file.
     """
     options = TableOptions.of(arguments)
     folder = path if path.is_dir() else path.parent
     files = _files(path, options)
     measured: list[Measured] = []
     for file in files:
-        for result in _tried(_measured(file, folder, options), options.strict):
+        for result in _tried(_measured(file, folder, options)):
             if isinstance(result, Measured):
                 measured.append(result)
             else:
@@ -107,17 +107,11 @@ def trials(
             say(line)
 
 
-def _tried(items: Iterator[Any], strict: bool) -> Iterator[Any]:
-    """Some items; if what makes them refuses to go on, in the end why.
-
-    Raises:
-        InputError: it does, and the user is strict.
-    """
+def _tried(items: Iterator[Any]) -> Iterator[Any]:
+    """Some items; if what makes them refuses to go on, in the end why."""
     try:
         yield from items
     except InputError as error:
-        if strict:
-            raise
         yield Refused(str(error))
 
 
@@ -167,7 +161,7 @@ def _measured(path: Path, folder: Path, options: TableOptions) -> Iterator[Any]:
     tables = frames.tables if options.frames else tables_in
     for table in tables(path, options):
         named = replace(table, name=table.name or name)
-        yield from _tried(map(_understood, [named], [place], [options]), options.strict)
+        yield from _tried(map(_understood, [named], [place], [options]))
 
 
 def _understood(table: Table, place: Path, options: TableOptions) -> Measured:
@@ -273,7 +267,7 @@ def _recorded(
 
     for trial, trial_labels in zip(measured, labels.of, strict=True):
         if trial.place.name not in labels.left_out:
-            yield from _tried(map(recorded, [trial], [trial_labels]), options.strict)
+            yield from _tried(map(recorded, [trial], [trial_labels]))
 
 
 def _meta(trial: Measured, arm: Chain | None, options: TableOptions) -> dict[str, Any]:

@@ -2,7 +2,7 @@
 column of texts, by their names, or by their folders."""
 
 import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -129,23 +129,28 @@ def labels_of(
         raise InputError(
             f"{table.path}: needs a column file with names such as {short_text(names)}"
         )
-    slips = [
-        f"{table.path}, line {row.line}: {name} names no file"
-        for name, row in rows.items()
-        if name not in {*names, *others}
-    ]
-    slips += [
-        f"{table.path}: has no row for {name}, which has no label"
-        for name in names
-        if name not in rows
-    ]
     labels = []
     for place in places:
         of_row = rows[place.name].labels if place.name in rows else {}
         merged = {**place.labels, **of_row}
         labels.append({task: label for task, label in merged.items() if label})
     left_out = frozenset(name for name, row in rows.items() if row.left_out)
-    return Labels(labels, TABLE, slips=slips, left_out=left_out)
+    slips = _slips(table.path, rows, names, others)
+    return Labels(labels, TABLE, slips=list(slips), left_out=left_out)
+
+
+def _slips(
+    path: Path, rows: Mapping[str, Row], names: Sequence[str], others: Iterable[str]
+) -> Iterator[str]:
+    """A sentence for each row of labels.csv whose name no file has, and for each trial
+    that has no row."""
+    files = {*names, *others}
+    for name, row in rows.items():
+        if name not in files:
+            yield f"{path}, line {row.line}: {name} names no file"
+    for name in names:
+        if name not in rows:
+            yield f"{path}: has no row for {name}, which has no label"
 
 
 def _by_trial(table: LabelTable) -> dict[str, Row]:

@@ -136,7 +136,6 @@ def add_table_options(parser: argparse.ArgumentParser) -> None:
         default="object",
         help="the task of these labels (default: %(default)s)",
     )
-    add("--strict", action="store_true", help="stop at the first file that is unusable")
     add_value_options(parser)
 
 
@@ -182,7 +181,6 @@ class TableOptions(ValueOptions):
     label: str | None = None
     axis: int | None = None
     task: str = "object"
-    strict: bool = False
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -115,6 +115,14 @@ def test_the_lines_of_pandas_make_a_recording(folder, refused):
     assert load(folder / "cup_1.npz").frames.tolist() == [[[1, 2]], [[3, 4]]]
 
 
+def test_a_file_whose_columns_are_not_those_of_most_is_left_out(folder, capsys):
+    put(folder, {"1.txt": "1 2\n", "2.txt": "1 2 3\n", "3.txt": "1 2\n"})
+    status, recordings = imported(folder, *RATE)
+    assert status == 1
+    assert list(recordings) == ["1", "3"]
+    assert "2.txt" in capsys.readouterr().err
+
+
 def test_the_first_frame_of_a_folder_is_the_earliest(folder):
     write_frames(folder / "cup", [10.0, 9.0], FRAMES[:2], "{1:g}")
     _, recordings = imported(folder, "--frames")
@@ -205,11 +213,6 @@ RATE = ("--rate", "1")
             {"1.txt": "1 2\n"},
             (*RATE, "--shape", "2x2"),
             "2 values a frame are no 2 x 2 taxels; give --shape",
-        ),
-        (
-            {"1.txt": "1 2\n", "2.txt": "1 2 3\n"},
-            (*RATE, "--strict"),
-            "2.txt: has time in s and 3 taxels ['1', '2', '3'], and most have time in s",
         ),
         (
             {"all.csv": "trial,t,p1\na,0,1\na,1,2\n"},
