@@ -1,10 +1,17 @@
-"""Ctrl-C while a module is being imported."""
+"""Ctrl-C while a module is being imported, and a program that is told to end."""
 
 import signal
+import sys
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
+
+
+def exit_on_sigterm() -> None:
+    """SIGTERM then ends the program as an exit does, so that no temporary file is
+    left."""
+    signal.signal(signal.SIGTERM, lambda number, _: sys.exit(128 + number))
 
 
 @contextmanager

@@ -4,6 +4,7 @@ import sys
 from collections.abc import Sequence
 
 from edge.__main__ import start
+from edge.interrupt import exit_on_sigterm
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -12,4 +13,5 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 if __name__ == "__main__":
+    exit_on_sigterm()
     sys.exit(main())

@@ -5,6 +5,7 @@ import sys
 from collections.abc import Iterable, Sequence
 
 from edge.app.cli import add_commands, dispatch
+from edge.interrupt import exit_on_sigterm
 
 COMMANDS = {
     "import": "train.commands.import_",
@@ -40,4 +41,5 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 if __name__ == "__main__":
+    exit_on_sigterm()
     sys.exit(main())

@@ -119,7 +119,8 @@ def load(
     paths = [data] if isinstance(data, str | Path) else data
     every = read(paths, progress=options.progress, skip_damaged=options.skip_damaged)
     recordings, notes = without_copies(every)
-    notes = [*every.damaged, *notes]
+    skipped = (f"warning: {error}; it is left out" for error in every.damaged)
+    notes = [*skipped, *notes]
     if options.fixed_window_s is None and not options.quick:
         seconds = [float(r.t[-1] - r.t[0]) for r in recordings.recordings]
         windows = windows_of(seconds)

@@ -285,7 +285,7 @@ def read(
         except InputError as error:
             if not skip_damaged:
                 raise
-            damaged.append(f"warning: {error}; it is left out")
+            damaged.append(str(error))
             continue
         paths.append(path)
         recordings.append(scratch.put_fields(recording))

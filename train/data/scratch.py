@@ -1,6 +1,7 @@
 """Arrays in temporary files, so that memory holds those alone that are in use."""
 
 import mmap
+import os
 import tempfile
 from collections.abc import Iterable, Iterator
 from dataclasses import replace
@@ -9,6 +10,8 @@ from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
+
+from edge.errors import InputError
 
 CHUNK_BYTES = 1 << 26
 EVERY = 256
@@ -36,19 +39,41 @@ class Scratch:
         return Scratch, ()
 
     def empty(self, shape: tuple[int, ...], dtype: Any = np.float64) -> NDArray[Any]:
-        """An array in a file, whose entries are 0."""
+        """An array in a file, whose entries are 0.
+
+        Raises:
+            InputError: there is no room.
+        """
         size = int(np.prod(shape, dtype=np.int64)) * np.dtype(dtype).itemsize
-        self._folder = self._folder or tempfile.TemporaryDirectory()
         if self._used + size > CHUNK_BYTES or not self._chunks:
-            path = Path(self._folder.name) / f"{len(self._chunks)}"
-            room = (max(size, CHUNK_BYTES),)
-            self._chunks.append(np.memmap(path, np.uint8, "w+", shape=room))
+            self._chunks.append(self._chunk(max(size, CHUNK_BYTES)))
             self._used = 0
             self.release()
         room_left = self._chunks[-1][self._used : self._used + size]
         self._used += -(-size // ALIGNED) * ALIGNED
         values: NDArray[Any] = np.asarray(room_left).view(dtype)
         return values.reshape(shape)
+
+    def _chunk(self, size: int) -> NDArray[np.uint8]:
+        """A file of so many bytes. The disk has them all before any is written, as a
+        mapped file that finds no room ends the program.
+
+        Raises:
+            InputError: there is no room.
+        """
+        try:
+            self._folder = self._folder or tempfile.TemporaryDirectory()
+            path = Path(self._folder.name) / f"{len(self._chunks)}"
+            with path.open("wb") as file:
+                if hasattr(os, "posix_fallocate"):  # Windows has none
+                    os.posix_fallocate(file.fileno(), 0, size)
+                file.truncate(size)
+            return np.memmap(path, np.uint8, "r+", shape=(size,))
+        except OSError as error:
+            raise InputError(
+                f"{tempfile.gettempdir()}: has no room for {size / 1e6:.0f} MB of "
+                f"temporary files: {error.strerror}; set TMPDIR to another folder"
+            ) from None
 
     def put(self, item: Any) -> Any:
         """An array, or a dictionary of them, in a file; anything else as it is."""

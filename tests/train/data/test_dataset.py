@@ -300,7 +300,7 @@ def test_a_damaged_file_is_refused_or_named_and_left_out(folder):
     data = read([folder], skip_damaged=True)
     assert len(data.paths) == len(data.recordings) == 4
     (sentence,) = data.damaged
-    assert sentence.startswith(f"warning: {folder / 'soft_2.npz'}: ")
+    assert sentence.startswith(f"{folder / 'soft_2.npz'}: ")
     assert data.digest != read([folder / "soft_0.npz"]).digest
     with pytest.raises(InputError, match="no recording can be used"):
         read([folder / "soft_2.npz"], skip_damaged=True)

@@ -1,6 +1,10 @@
 """Arrays in temporary files."""
 
+import errno
+import os
 import pickle
+import signal
+import sys
 from dataclasses import dataclass
 
 import numpy as np
@@ -8,6 +12,8 @@ import pytest
 from joblib import delayed
 from numpy.typing import NDArray
 
+from edge.errors import InputError
+from tests.conftest import ROOT, ended
 from train.data import scratch as module
 from train.data.scratch import Scratch
 from train.threads import in_processes
@@ -47,3 +53,36 @@ def test_other_processes_map_the_files(scratch):
     kind, total = in_processes(2, calls)
     assert kind is np.memmap
     assert total == stored.sum()
+
+
+def test_a_full_disk_is_named(scratch, monkeypatch):
+    """Else the first write to a mapped file ends the program by a signal."""
+
+    def allocate(*arguments):
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr(module.os, "posix_fallocate", allocate, raising=False)
+    with pytest.raises(InputError, match="set TMPDIR to another folder"):
+        scratch.put(np.arange(3.0))
+
+
+SIMULATING = """
+import runpy, signal, sys
+from train import progress
+from train.data.scratch import Scratch
+scratch = Scratch()
+scratch.empty((3,))
+progress.bar = lambda *_, **__: signal.raise_signal(signal.SIGTERM)
+sys.argv[1:] = ["simulate", "train/scenes/demo.toml", "--out", "{out}"]
+runpy.run_module("train", run_name="__main__")
+"""
+
+
+def test_a_program_that_is_told_to_end_leaves_no_temporary_file(tmp_path):
+    (tmp_path / "temporary").mkdir()
+    environment = {**os.environ, "TMPDIR": str(tmp_path / "temporary")}
+    program = SIMULATING.format(out=tmp_path / "out")
+    command = [sys.executable, "-c", program]
+    run = ended(*command, cwd=ROOT, env=environment)
+    assert run.returncode == 128 + signal.SIGTERM
+    assert list((tmp_path / "temporary").iterdir()) == []
