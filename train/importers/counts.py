@@ -359,13 +359,19 @@ def _finest(deviations: Iterable[NDArray[np.float64]]) -> float:
     """The counts a unit that make all deviations whole, or else use all counts."""
     scales = 10.0 ** np.arange(DECIMALS + 1)
     errors = np.zeros(len(scales))
-    largest = 0.0
+    most = np.inf
     for d in deviations:
-        shear = _largest(d[..., 1:]) * MOST_COUNTS / MOST_SHEAR
-        largest = max(largest, _largest(d[..., :1]), shear)
-        errors = np.fmax(errors, [_largest(d * s - np.rint(d * s)) for s in scales])
-    suit = (errors < 1e-6 * scales) & (scales * largest <= MOST_COUNTS)
-    return float(scales[suit.argmax()]) if suit.any() else MOST_COUNTS / largest
+        largest = max(
+            _largest(d[..., :1]), _largest(d[..., 1:]) * MOST_COUNTS / MOST_SHEAR
+        )
+        most = min(most, MOST_COUNTS / largest) if largest else most
+        # Values that a scale makes too large are not multiplied by it.
+        fitting = scales <= most
+        scales = scales[fitting]
+        differences = [_largest(d * s - np.rint(d * s)) for s in scales]
+        errors = np.fmax(errors[fitting], differences)
+    suit = errors < 1e-6 * scales
+    return float(scales[suit.argmax()]) if suit.any() else float(most)
 
 
 def _largest(values: NDArray[np.float64]) -> float:
