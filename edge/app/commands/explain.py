@@ -76,20 +76,20 @@ class Space(NamedTuple):
             def value(name: str) -> Array:
                 return graph.run([name], {"decision_point": np.array([last])})[0]
 
-            def constant(name: str) -> Array:
-                """A row for each decision point, of which the last counts."""
+            def constant(name: str, rank: int) -> Array:
+                """The last row, where decision points have different ones."""
                 array = graph.constants[f"{name} of {task}"]
-                return array[-1] if last else array
+                return array if array.ndim == rank else array[-1]
 
             unit = value(graph.makers[f"{task}_distances"].inputs[1])
             components = model.info.tasks[task].components
             columns = np.arange(model.info.width)
             if "Gather" in first:
                 columns = value(first["Gather"][1])
-            columns_of_rows = constant("columns").astype(np.float64)
+            columns_of_rows = constant("coordinates", 2).astype(np.float64)
             rows = columns_of_rows.T[:, :components] * (-0.5 * unit)
             # Trials without a label are infinitely far away.
-            rows[np.isinf(constant("lengths"))] = np.inf
+            rows[np.isinf(constant("lengths", 1))] = np.inf
             return cls(
                 columns=columns,
                 mean=value(first["Sub"][1]),
