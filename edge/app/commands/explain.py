@@ -11,15 +11,15 @@ from typing import Any, NamedTuple, Self
 
 import numpy as np
 
-from edge.app.commands.replay import contact_of
 from edge.app.options import add_file, apart
-from edge.app.output import Output, counted
+from edge.app.output import Output
 from edge.app.texts import wrapped
 from edge.arrays import Array, Booleans, Floats, Integers
 from edge.decide.graph import Graph
 from edge.decide.info import ModelInfo
 from edge.decide.model import Model
-from edge.errors import InputError
+from edge.decide.summary import contact_of
+from edge.errors import InputError, counted
 from edge.files import parsing
 from edge.record.recording import Recording, load
 from edge.record.saving import find
