@@ -52,12 +52,3 @@ class Output:
 def _printable_lines(text: str) -> str:
     """The text without control characters but line breaks."""
     return "\n".join(map(printable, text.split("\n")))
-
-
-def counted(count: int, noun: str) -> str:
-    """A count with its noun: "1 chip", "2 chips".
-
-    >>> counted(1, "chip"), counted(2, "chip")
-    ('1 chip', '2 chips')
-    """
-    return f"{count} {noun}{'s' * (count != 1)}"

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from edge.app.output import counted
+from edge.errors import counted
 from edge.features.names import feature
 from edge.features.vector import WINDOW_S
 from edge.touch.layout import SkinLayout

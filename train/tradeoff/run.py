@@ -8,8 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from edge.app.output import counted
-from edge.errors import InputError
+from edge.errors import InputError, counted
 from edge.record.recording import Recording
 from edge.writing import write_whole
 from train.data.dataset import DataSet, read

@@ -12,7 +12,8 @@ from collections.abc import Iterator
 from dataclasses import asdict
 
 from edge.app.options import add_file, within
-from edge.app.output import Output, counted
+from edge.app.output import Output
+from edge.errors import counted
 from edge.wire.chips.block import UNCHANGED_FRAMES
 from edge.wire.skin.calibration import deaf_taxels
 from edge.wire.skin.decoder import NEVER_STUCK, stuck_limits

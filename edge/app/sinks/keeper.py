@@ -9,13 +9,13 @@ from contextlib import suppress
 from datetime import UTC, datetime
 from pathlib import Path
 
-from edge.app.commands.record import Trials, recording, shared_meta
-from edge.app.output import LOG, counted
+from edge.app.output import LOG
 from edge.app.review import decisions_of, is_unsure
 from edge.app.source import Opened
+from edge.app.trials import Trials, recording, shared_meta
 from edge.decide.events import Decided, Event
 from edge.decide.info import ModelInfo
-from edge.errors import EdgeError, InputError
+from edge.errors import EdgeError, InputError, counted
 from edge.record.changes import alone
 from edge.record.labels import read_table
 from edge.record.recording import read_meta

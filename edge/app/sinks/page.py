@@ -16,8 +16,7 @@ from typing import Any
 import numpy as np
 
 from edge.app import review
-from edge.app.commands.label import changed
-from edge.app.review import Touch
+from edge.app.review import Touch, changed
 from edge.app.sinks.web import WebServer
 from edge.decide.events import Decided, Event, Onset
 from edge.errors import InputError

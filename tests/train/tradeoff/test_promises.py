@@ -12,8 +12,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from edge.app.commands.replay import decide
 from edge.decide.model import Model
+from edge.decide.summary import decide
 from edge.record.recording import load
 from tests.conftest import ROOT, rows_of
 from tests.train.tradeoff.test_tradeoff import board_file
