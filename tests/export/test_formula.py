@@ -1,12 +1,9 @@
-"""A model's graph in C gives the bits of `Model.run`, and shares its memory."""
+"""The formula in C gives the bits of `Model.run`."""
 
 import numpy as np
 import pytest
 
-from edge import demo
 from edge.decide.model import Model
-from export.build import smallest
-from export.c_graph import TYPES, CompiledGraph
 from export.graph import to_onnx
 from tests.checks.hard_cases.models import describe
 from tests.edge.decide.test_engines import assert_same_bits, hostile
@@ -33,7 +30,7 @@ def hostile_blends(X, count, rng):
 @pytest.mark.slow
 @needs_gcc
 @pytest.mark.parametrize("seed", range(10))
-def test_a_random_models_graph_has_the_same_bits_of_hostile_vectors(tmp_path, seed):
+def test_a_random_model_has_the_same_bits_of_hostile_vectors(tmp_path, seed):
     """All trials may vote, each may have a label of its own, and tasks may lack some."""
     rng = np.random.default_rng(seed)
     kinds = "plain lattice duplicates outlier far".split()
@@ -53,23 +50,3 @@ def test_a_random_models_graph_has_the_same_bits_of_hostile_vectors(tmp_path, se
     vectors = [*queries, *hostile(24, rng), *hostile_blends(X, 500, rng)]
     assert_same_bits(path, vectors)
     assert_same(Model(path), tmp_path / "c", [], vectors)
-
-
-def test_a_table_takes_the_smallest_type_that_holds_it():
-    for values, kind in (
-        ([0.0, -128.0], "int8"),
-        ([128.0], "int16"),
-        ([-32769.0], "int32"),
-        ([0.5, np.inf], "float32"),
-        ([0.1], "float64"),
-    ):
-        table = smallest(np.array(values), TYPES)
-        assert table.dtype.name == kind
-        assert table.tolist() == values
-
-
-def test_the_arena_is_shared_by_values_that_do_not_meet():
-    model = Model(demo.MODEL)
-    graph = CompiledGraph(model, model.outputs, [0], 0)
-    values = sum(len(step.outputs) * step.sizes[0] for step in graph.steps)
-    assert graph.arena < values / 2
