@@ -162,7 +162,7 @@ class Source:
         self.ram = 0
         self.work: dict[str, float] = dict.fromkeys(COSTS, 0.0)
         self.work["task"] += len(model.info.tasks)
-        outputs = set(model.outputs) - set(() if doubts else DOUBTS)
+        outputs = set(model.info.outputs) - set(() if doubts else DOUBTS)
         points = range(len(windows_s))[-self._last :]
         room = self._info.width + self._features()
         graph = CompiledGraph(model, outputs, points, room)

@@ -16,7 +16,7 @@ OPTIONAL = (
     "edge/record/counts.py",
     "edge/decide/early.py",
     "edge/decide/agreement.py",
-    "edge/decide/graph.py",
+    "edge/decide/knn.py",
     "edge/decide/no_contact.py",
     "edge/app/sinks/systemd.py",
     "edge/record/recording.py",
