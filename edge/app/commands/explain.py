@@ -8,11 +8,11 @@ import argparse
 from collections.abc import Iterator
 from typing import Any
 
-from edge.app.commands.replay import contact_of
 from edge.app.options import add_file, apart
-from edge.app.output import Output, counted
+from edge.app.output import Output
 from edge.decide.model import Model
-from edge.errors import InputError
+from edge.decide.summary import contact_of
+from edge.errors import InputError, counted
 from edge.record.recording import Recording, load
 from edge.record.saving import find
 
