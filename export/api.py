@@ -80,7 +80,7 @@ def describe(fitted: Fitted, name: str | None = None) -> ModelInfo:
     """
     dataset = fitted.dataset
     folder, trials = names(dataset)
-    packages = ("numpy", "scikit-learn", "skl2onnx", "onnx")
+    packages = ("numpy", "scikit-learn", "onnx")
     return ModelInfo(
         tasks={task: _task(fitted, task) for task in fitted.classifier.choices},
         layout=dataset.layout,
