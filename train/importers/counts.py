@@ -185,20 +185,16 @@ class Rest:
         parts = []
         # A part at a time, as a long recording would else fill the memory several
         # times.
-        for at in range(0, len(trial.t), PART):
-            values = trial.values[at : at + PART]
+        for values in np.array_split(trial.values, len(trial.t) // PART + 1):
             valid = self._valid(values)[..., None]
             counts = np.where(valid, values - self.base, 0.0) * self.scale
+            normal = counts[..., 0]
             if self.values is not None:
-                normal = counts[..., 0]
-                counts[..., 0] = np.maximum(-normal, 0.0) if self.falls else abs(normal)
+                normal[...] = np.maximum(-normal, 0.0) if self.falls else abs(normal)
             whole = np.rint(counts)
-            if (
-                whole[..., 0].min() < 0.0
-                or whole[..., 0].max() > MOST_COUNTS
-                or _largest(whole[..., 1:]) > MOST_SHEAR
-                or (is_exact and not np.array_equal(counts, whole))
-            ):
+            is_within = normal.min() > -0.5 and normal.max() < MOST_COUNTS + 0.5
+            is_within &= _largest(whole[..., 1:]) <= MOST_SHEAR
+            if not is_within or (is_exact and not np.array_equal(counts, whole)):
                 return None
             parts.append(whole.astype(np.int32))
         return np.concatenate(parts)
@@ -360,15 +356,13 @@ def _finest(deviations: Iterable[NDArray[np.float64]]) -> float:
     errors = np.zeros(len(scales))
     most = np.inf
     for d in deviations:
-        largest = max(
-            _largest(d[..., :1]), _largest(d[..., 1:]) * MOST_COUNTS / MOST_SHEAR
-        )
+        shear = _largest(d[..., 1:]) * MOST_COUNTS / MOST_SHEAR
+        largest = max(_largest(d[..., :1]), shear)
         most = min(most, MOST_COUNTS / largest) if largest else most
         # Values that a scale makes too large are not multiplied by it.
-        fitting = scales <= most
-        scales = scales[fitting]
+        scales = scales[scales <= most]
         differences = [_largest(d * s - np.rint(d * s)) for s in scales]
-        errors = np.fmax(errors[fitting], differences)
+        errors = np.fmax(errors[: len(scales)], differences)
     suit = errors < 1e-6 * scales
     return float(scales[suit.argmax()]) if suit.any() else float(most)
 
