@@ -1,7 +1,7 @@
 """The base of all errors, the errors that a user can correct, and text that is safe to
 print."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 
 
@@ -67,3 +67,26 @@ def about(name: str) -> Iterator[None]:
         yield
     except InputError as error:
         raise InputError(f"{name}: {error}") from None
+
+
+def counted(count: int, noun: str) -> str:
+    """A count with its noun: "1 chip", "2 chips".
+
+    >>> counted(1, "chip"), counted(2, "chip")
+    ('1 chip', '2 chips')
+    """
+    return f"{count} {noun}{'s' * (count != 1)}"
+
+
+MOST_PLACES = 6
+"""Taxels that a line for a person names."""
+
+
+def places_text(taxels: Sequence[Sequence[int]]) -> str:
+    """The first taxels of some.
+
+    >>> places_text([(3, 5), (0, 1)])
+    '[3, 5], [0, 1]'
+    """
+    more = " ..." if len(taxels) > MOST_PLACES else ""
+    return ", ".join(f"[{row}, {col}]" for row, col in taxels[:MOST_PLACES]) + more

@@ -39,13 +39,13 @@ class Builder:
         decision_point: name of the scalar that says which decision point is asked for;
             unused without decision points.
         made: nodes, in the order of computation.
-        constants: by their contents.
+        constants: by their names.
     """
 
     def __init__(self) -> None:
         self.decision_point = ""
         self.made: list[NodeProto] = []
-        self.constants: dict[tuple[Any, ...], TensorProto] = {}
+        self.constants: dict[str, TensorProto] = {}
         self._results: dict[tuple[Any, ...], str] = {}
 
     def among(self, decision_points: Sequence[int], count: int) -> Builder:
@@ -59,28 +59,34 @@ class Builder:
         first = decision_points[0]
         places = np.clip(np.arange(count), first, decision_points[-1]) - first
         part = copy.copy(self)
-        part.decision_point = self.node("Gather", places, self.decision_point, axis=0)
+        name = f"places from {first} to {decision_points[-1]}"
+        part.decision_point = self.node(
+            "Gather", self.constant(places, name), self.decision_point, axis=0
+        )
         return part
 
     def constant(self, value: Any, name: str = "") -> str:
-        """Name of a constant of the value's type; equal ones are stored once, but for
-        those that are given a name."""
-        array = np.asarray(value)
-        key = (name, array.dtype.str, array.shape, array.tobytes())
-        if key not in self.constants:
-            stored_name = name or f"constant {len(self.constants)}"
-            self.constants[key] = numpy_helper.from_array(array, stored_name)
-        return self.constants[key].name
+        """Name of a constant of the value's type, which is stored once.
 
-    def by_decision_point(self, values: Sequence[Any], name: str = "") -> str:
-        """Name of the value, at the decision point that is asked for, of a constant."""
-        same = all(np.array_equal(value, values[0]) for value in values)
-        if len(values) == 1 or (same and not name):
+        A literal of the graph, as an axis, is called by its value.
+        """
+        array = np.asarray(value)
+        name = name or f"{array.dtype} {array.tolist()}"
+        if name not in self.constants:
+            self.constants[name] = numpy_helper.from_array(array, name)
+        return name
+
+    def by_decision_point(self, values: Sequence[Any], name: str) -> str:
+        """Name of the value, at the decision point that is asked for, of a constant.
+
+        Values that differ are stored one after another, and those that do not as one.
+        """
+        if all(np.array_equal(value, values[0]) for value in values):
             return self.constant(values[0], name)
         stack = self.constant(np.stack(values), name)
         return self.node("Gather", stack, self.decision_point, axis=0)
 
-    def by_decision_point_small(self, values: Sequence[Any], name: str = "") -> str:
+    def by_decision_point_small(self, values: Sequence[Any], name: str) -> str:
         """As `by_decision_point`, stored in the smallest type that holds all values
         exactly.
 
@@ -93,10 +99,10 @@ class Builder:
             return stored
         return self.node("Cast", stored, to=TensorProto.DOUBLE)
 
-    def shifted(self, x: str, y: str, shifts: Sequence[int]) -> str:
+    def shifted(self, x: str, y: str, shifts: Sequence[int], name: str) -> str:
         """Name of a whole product of matrices, divided by 2^shift and rounded, with a
-        shift for each decision point, or one for all."""
-        factors = self.by_decision_point([2.0**-shift for shift in shifts])
+        shift for each decision point, or one for all, and a name for these factors."""
+        factors = self.by_decision_point([2.0**-shift for shift in shifts], name)
         product = self.node("MatMul", x, y)
         return self.node("Round", self.node("Mul", product, factors))
 
@@ -146,17 +152,16 @@ class Builder:
     def _names(self, inputs: Sequence[Any]) -> list[str]:
         return [i if isinstance(i, str) else self.constant(i) for i in inputs]
 
-    def clipped(self, x: str, limits: Sequence[float]) -> tuple[str, str]:
+    def clipped(self, x: str, limits: Sequence[float], name: str) -> tuple[str, str]:
         """Whole numbers (n, m) cut off at plus and minus a limit for each decision
-        point, or one for all.
+        point, or one for all; the limits have a name.
 
         Returns:
             Names of the numbers, and of their summed excess (n, 1), which is 0 within
             the limits and not finite where a number is not.
         """
-        low, high = (
-            self.by_decision_point([sign * x for x in limits]) for sign in (-1.0, 1.0)
-        )
+        high = self.by_decision_point(limits, name)
+        low = self.by_decision_point([-x for x in limits], f"negative {name}")
         inside = self.node("Clip", x, low, high)
         excess = self.node("Sub", x, inside)
         return inside, self.node("ReduceL1", excess, [1], keepdims=1)
@@ -167,27 +172,32 @@ def product(
     x: str,
     decision_points: Sequence[Projection],
     components: int,
+    name: str,
 ) -> tuple[str, str]:
     """Nodes that multiply features (n, p) by the weights of a projection for each
-    decision point.
+    decision point; the constants' names end with a name.
 
     Returns:
         Names of the whole products (n, components) in the grid's units, and of how much
         was cut off from features to get them, as in `project`.
     """
-    means = build.by_decision_point([p.mean_ for p in decision_points])
-    centred = build.node("Sub", x, means)
-    gains = [p.gain_ / p.grid_.step for p in decision_points]
-    scaled = build.node("Mul", centred, build.by_decision_point(gains))
-    steps, far = build.clipped(build.node("Round", scaled), [MOST_STEPS])
+    means = [p.mean_ for p in decision_points]
+    centred = build.node("Sub", x, build.by_decision_point(means, f"means {name}"))
+    gains = build.by_decision_point(
+        [p.gain_ / p.grid_.step for p in decision_points], f"gains {name}"
+    )
+    steps = build.node("Round", build.node("Mul", centred, gains))
+    steps, far = build.clipped(steps, [MOST_STEPS], "most steps")
     # A step over a unit is a power of two, so that the products' sums are still exact.
     weights = [p.weights_ * (p.grid_.step / p.grid_.unit) for p in decision_points]
-    columns = build.by_decision_point_small(widened(weights, components))
+    columns = build.by_decision_point_small(
+        widened(weights, components), f"weights {name}"
+    )
     return build.node("Round", build.node("MatMul", steps, columns)), far
 
 
 def project(
-    build: Builder, spaces: Sequence[FittedSpace], width: int
+    build: Builder, spaces: Sequence[FittedSpace], width: int, number: int
 ) -> tuple[str, str]:
     """Nodes that take `features` (n, width) to whole coordinates; see
     `train.model.projection.Projection`.
@@ -199,6 +209,7 @@ def project(
         build: takes the nodes.
         spaces: of each decision point.
         width: the number of features.
+        number: of the space, by which its constants are called.
 
     Returns:
         Names of the coordinates (n, c) in the grid's units, and of how much was cut off
@@ -213,16 +224,22 @@ def project(
     products = []
     for start, end in zip(starts, [*starts[1:], count], strict=True):
         part = build.among(range(start, end), count)
+        name = f"of space {number} from {start}"
         selected = "features"
         if len(columns[start]) < width:
-            selected = build.node("Gather", selected, columns[start], axis=1)
-        products.append(product(part, selected, projections[start:end], components))
+            places = build.constant(columns[start], f"columns {name}")
+            selected = build.node("Gather", selected, places, axis=1)
+        of_part = projections[start:end]
+        products.append(product(part, selected, of_part, components, name))
     rounded, far = products[0]
     for start, (later, later_far) in zip(starts[1:], products[1:], strict=True):
-        is_earlier = build.by_decision_point([point < start for point in range(count)])
+        is_earlier = build.by_decision_point(
+            [point < start for point in range(count)], f"points before {start}"
+        )
         rounded = build.node("Where", is_earlier, rounded, later)
         far = build.node("Where", is_earlier, far, later_far)
-    z, farther = build.clipped(rounded, [p.grid_.limit for p in projections])
+    limits = [p.grid_.limit for p in projections]
+    z, farther = build.clipped(rounded, limits, f"limits of space {number}")
     off = build.node("Add", far, farther)
     if min(map(len, columns)) < width:
         # A feature that another task or decision point takes must be finite too.

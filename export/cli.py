@@ -13,11 +13,10 @@ from typing import Any
 import numpy as np
 
 from edge.app.cli import dispatch
-from edge.app.commands.replay import Summary, compared, decide
-from edge.app.options import within
-from edge.app.trial_options import add_arm, open_arm
+from edge.app.options import add_arm, open_arm, within
 from edge.decide.classifier import suited
 from edge.decide.model import Model
+from edge.decide.summary import Summary, compared, decide
 from edge.errors import InputError
 from edge.features.vector import WINDOW_S
 from edge.record.labels import read_table

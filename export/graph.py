@@ -56,7 +56,7 @@ def _squares(
 
     Args:
         build: takes the nodes.
-        name: of what the rows belong to.
+        name: of the lengths.
         y: name of the points.
         factor: name of what gives -2 row.y when multiplied by the columns: the points,
             where no coordinate has a weight.
@@ -64,7 +64,7 @@ def _squares(
         lengths: (rows,) |row|^2 at each decision point; infinite of a row that does not
             count.
     """
-    summands = build.by_decision_point(lengths, f"lengths of {name}")
+    summands = build.by_decision_point(lengths, name)
     squares = build.node("Gemm", factor, columns, summands)
     return build.node("Add", squares, build.squared_length(y))
 
@@ -86,15 +86,15 @@ def _squares_of_task(
     width = rows[0].shape[1]
     if min(components) < width:
         masks = [(np.arange(width) < c).astype(np.float64) for c in components]
-        z = build.node("Mul", z, build.by_decision_point(masks))
+        z = build.node("Mul", z, build.by_decision_point(masks, f"mask of {task}"))
     columns = build.by_decision_point_small(
-        [-2.0 * r.T for r in rows], f"columns of {task}"
+        [-2.0 * r.T for r in rows], f"coordinates of {task}"
     )
     lengths = []
     for r, c in zip(rows, components, strict=True):
         squares = (r[:, :c] ** 2).sum(axis=1)
         lengths.append(np.where(absent, np.inf, squares))
-    return _squares(build, task, z, z, columns, lengths)
+    return _squares(build, f"lengths of {task}", z, z, columns, lengths)
 
 
 def _vote(
@@ -121,9 +121,9 @@ def _vote(
     voters = build.node("Gather", trial_labels, neighbours)
     # A vector that is not finite has no votes: class -1, whose row of the votes (the
     # last) is 0.
-    finite = build.node("LessOrEqual", off, LARGEST)
-    voters = build.node("Where", finite, voters, -1)
-    ballots = np.eye(classes + 1, classes)
+    largest = build.constant(LARGEST, "largest number")
+    voters = build.node("Where", build.node("LessOrEqual", off, largest), voters, -1)
+    ballots = build.constant(np.eye(classes + 1, classes), f"ballots of {classes}")
     label = f"{task}_label"
     scores = f"{task}_scores"
     if k <= 2:
@@ -155,7 +155,14 @@ def _build(model: Fitted) -> Builder:
     for task in model.choices:
         spaces = _spaces(points, task)
         if spaces not in projected:
-            projected[spaces] = project(build, spaces, points[-1].n_features_in_)
+            width = points[-1].n_features_in_
+            projected[spaces] = project(build, spaces, width, len(projected))
+        build.constant(list(projected).index(spaces), f"space of {task}")
+    by_point = zip(*projected, strict=True)
+    units = build.by_decision_point(
+        [[space.projection.grid_.unit for space in spaces] for spaces in by_point],
+        "units",
+    )
     # The excess itself is a sum of fractions, whose last bits depend on the order of
     # summation. Whether it is above 0 does not.
     excesses = [off for _, off in projected.values()]
@@ -166,7 +173,8 @@ def _build(model: Fitted) -> Builder:
     if isinstance(model, SequentialClassifier):
         _doubt(build, model.space_)
     for task in model.choices:
-        of_task = projected[_spaces(points, task)]
+        unit = build.node("Gather", units, f"space of {task}", axis=0)
+        of_task = (*projected[_spaces(points, task)], unit)
         _task(build, points, task, of_task, _has_label_distances(model))
     return build
 
@@ -184,7 +192,7 @@ def _task(
     build: Builder,
     points: Sequence[ContactClassifier],
     task: str,
-    projected: tuple[str, str],
+    projected: tuple[str, str, str],
     has_label_distances: bool,
 ) -> None:
     """Nodes from coordinates to a task's outputs.
@@ -193,7 +201,8 @@ def _task(
         build: takes the nodes.
         points: the classifier of each decision point.
         task: its name.
-        projected: names of the coordinates, and of the excess over the limits.
+        projected: names of the coordinates, of the excess over the limits, and of the
+            coordinates' unit.
         has_label_distances: whether something goes by them.
     """
     trials = points[-1].n_trials_
@@ -208,13 +217,13 @@ def _task(
     labels = np.full(trials, -1)
     labels[members] = last.labels
     components = [point.choices[task].components for point in points]
-    z, off = projected
+    z, off, unit = projected
     rows = widened(rows, max(row.shape[1] for row in rows))
     squares = _squares_of_task(build, task, z, rows, components, labels < 0)
     outputs = ["", f"{task}_neighbours"]
-    nearest, neighbours = build.nodes("TopK", [squares, [last.k]], outputs, largest=0)
-    units = build.by_decision_point([fitted.unit for fitted in at_points])
-    build.node("Mul", build.node("Sqrt", nearest), units, output=f"{task}_distances")
+    k = build.constant([last.k], f"k of {task}")
+    nearest, neighbours = build.nodes("TopK", [squares, k], outputs, largest=0)
+    build.node("Mul", build.node("Sqrt", nearest), unit, output=f"{task}_distances")
     _vote(build, task, labels, len(last.classes), neighbours, last.k, off)
     if has_label_distances:
         scales = [fitted.unit * fitted.slope for fitted in at_points]
@@ -225,26 +234,30 @@ def _doubt(build: Builder, space: NoveltySpace) -> None:
     """Nodes that score how unlike all training trials features (n, p) are, by their
     novelty and remoteness; see `train.model.novelty`."""
     points = space.points
-    means = build.by_decision_point_small([p.mean for p in points])
+    means = build.by_decision_point_small([p.mean for p in points], "novelty means")
     centred = build.node("Sub", "features", means)
-    gains = build.by_decision_point_small([p.gain for p in points])
+    gains = build.by_decision_point_small([p.gain for p in points], "novelty gains")
     rounded = build.node("Round", build.node("Mul", centred, gains))
-    steps, _ = build.clipped(rounded, [CLIP * 2.0**STEP_BITS])
-    weights = build.by_decision_point_small([space.weights])
-    z = build.shifted(steps, weights, [space.shift])
+    most = [CLIP * 2.0**STEP_BITS]
+    steps, _ = build.clipped(rounded, most, "novelty most steps")
+    weights = build.by_decision_point_small([space.weights], "novelty weights")
+    z = build.shifted(steps, weights, [space.shift], "novelty factor")
     squares = build.squared_length(steps)
     outside = build.node("Sub", squares, build.squared_length(z))
     outside = build.node("Max", outside, 1.0)
-    whitening = build.by_decision_point_small([p.whitening for p in points])
-    y = build.shifted(z, whitening, [p.shift for p in points])
-    y, _ = build.clipped(y, [FARTHEST])
+    whitening = build.by_decision_point_small(
+        [p.whitening for p in points], "novelty whitening"
+    )
+    shifts = [p.shift for p in points]
+    y = build.shifted(z, whitening, shifts, "novelty whitening factors")
+    y, _ = build.clipped(y, [FARTHEST], "novelty limit")
     # Twice the rows, so that |row|^2 - 2 row.y needs no further product.
     columns = build.by_decision_point_small(
-        [-2.0 * p.rows.T for p in points], "columns of novelty"
+        [-2.0 * p.rows.T for p in points], "novelty coordinates"
     )
     lengths = [(p.rows**2).sum(axis=1) for p in points]
-    squares = _squares(build, "novelty", y, y, columns, lengths)
-    nearest = _nearest(build, squares, [p.nearness for p in points])
+    squares = _squares(build, "novelty lengths", y, y, columns, lengths)
+    nearest = _nearest(build, squares, [p.nearness for p in points], "novelty nearness")
     score = build.node("Mul", build.node("Sqrt", outside), nearest)
     build.node("Squeeze", score, [1], output="novelty")
     _remoteness(build, y, columns, points)
@@ -257,20 +270,24 @@ def _remoteness(
     points: Sequence[NoveltyPoint],
 ) -> None:
     """Nodes from whitened coordinates y (n, c) to the remoteness."""
-    weights = build.by_decision_point([p.weights for p in points])
+    weights = build.by_decision_point([p.weights for p in points], "remoteness weights")
     weighted = build.node("Mul", y, weights)
     # The rows are stored once: their weights stand beside those of y.
     factor = build.node("Mul", weighted, weights)
     lengths = [((p.rows * p.weights) ** 2).sum(axis=1) for p in points]
-    squares = _squares(build, "remoteness", weighted, factor, columns, lengths)
-    root = _nearest(build, squares, [p.weighted_nearness for p in points])
+    squares = _squares(build, "remoteness lengths", weighted, factor, columns, lengths)
+    nearness = [p.weighted_nearness for p in points]
+    root = _nearest(build, squares, nearness, "remoteness nearness")
     build.node("Squeeze", root, [1], output="remoteness")
 
 
-def _nearest(build: Builder, squares: str, nearness: Sequence[Floats]) -> str:
+def _nearest(
+    build: Builder, squares: str, nearness: Sequence[Floats], name: str
+) -> str:
     """Name of the root (n, 1) of the smallest of squares (n, rows) times the nearness
-    (rows,) at each decision point."""
-    squares = build.node("Mul", squares, build.by_decision_point_small(nearness))
+    (rows,), which has a name, at each decision point."""
+    factors = build.by_decision_point_small(nearness, name)
+    squares = build.node("Mul", squares, factors)
     nearest, _ = build.nodes("TopK", [squares, [1]], ["", ""], largest=0)
     return build.node("Sqrt", nearest)
 
@@ -298,17 +315,20 @@ def _label_distances(
     for label, size in enumerate(sizes):
         members[label, :size] = np.flatnonzero(labels == label)
     is_nearest = np.arange(counts.max()) < counts[:, None]
+    places = build.constant(members, f"members of {task}")
     wider = build.node("Pad", squares, [0, 0, 0, 1], np.inf)
-    squares_of_label = build.node("Gather", wider, members, axis=1)
-    most = counts.max(keepdims=True)
+    squares_of_label = build.node("Gather", wider, places, axis=1)
+    most = build.constant(counts.max(keepdims=True), f"most of {task}")
     nearest, _ = build.nodes(
         "TopK", [squares_of_label, most], ["", ""], axis=2, largest=0
     )
     roots = build.node("Round", build.node("Sqrt", nearest))
-    counted = build.node("Where", is_nearest, roots, 0.0)
+    counts_of_label = build.constant(is_nearest, f"nearest of {task}")
+    counted = build.node("Where", counts_of_label, roots, 0.0)
     total = build.node("ReduceSum", counted, [2], keepdims=0)
-    distances = build.node("Div", total, counts.astype(np.float64))
-    factors = build.by_decision_point(scales)
+    divisors = build.constant(counts.astype(np.float64), f"counts of {task}")
+    distances = build.node("Div", total, divisors)
+    factors = build.by_decision_point(scales, f"scales of {task}")
     build.node("Mul", distances, factors, output=f"{task}_label_distances")
 
 

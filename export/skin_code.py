@@ -13,13 +13,12 @@ from typing import Any
 
 import numpy as np
 
-from edge.app.commands import calibrate
 from edge.errors import InputError
 from edge.wire.bus import protocol, retrying
 from edge.wire.chips import ad7147, mpr121
 from edge.wire.chips.chip import MOST_TAXELS, ChipSpec, Script, Step
 from edge.wire.chips.kinds import KINDS
-from edge.wire.skin import bus_reader, decoder, lone
+from edge.wire.skin import bus_reader, calibration, decoder, lone
 from edge.wire.skin.file import Signal, SkinFile
 from edge.writing import write_whole
 from export.c_code import ROOMS, array, literal, write_rooms
@@ -45,7 +44,7 @@ NUMBERS: tuple[tuple[Any, tuple[str, ...]], ...] = (
     (bus_reader, ("SET_UP_AFTER", "SET_UP_EVERY", "OLDEST_FRAMES")),
     (lone, ("FEWEST_NEIGHBOURS",)),
     (ad7147, ("IDENTIFIED_EVERY",)),
-    (calibrate, ("FEWEST_FRAMES", "NOISY", "NOISY_COUNTS")),
+    (calibration, ("FEWEST_FRAMES", "NOISY", "NOISY_COUNTS")),
     (decoder, ("COARSE",)),
 )
 """Constants that have the same names in C."""
@@ -118,7 +117,7 @@ def _numbers(file: SkinFile, hz: int) -> dict[str, Any]:
             "frames_of_conversion": 1 + math.ceil(decoder.CONVERSION_S * rate_hz),
             "chance": math.exp(decoder.LOG_CHANCE),
             "repeats_of_1": 0.5 / math.sqrt(math.pi),
-            "standing_out": int(calibrate.SPREADS),
+            "standing_out": int(calibration.SPREADS),
             "ad7147_identity": ad7147.IDENTITY,
             "mpr121_saturated": mpr121.SATURATED,
             "dead_band_sigma": signal.dead_band_sigma,

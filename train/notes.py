@@ -6,8 +6,8 @@ from pathlib import Path
 import numpy as np
 from sklearn.neighbors import NearestNeighbors
 
-from edge.app.output import counted
 from edge.arrays import Floats
+from edge.errors import counted
 from edge.features import names as measures
 from train.data import outliers
 from train.data.dataset import DataSet

@@ -167,3 +167,26 @@ def selected(among: Sequence[Touch], words: Sequence[str]) -> list[Touch]:
             names = ", ".join([*KINDS, *sorted(tasks)])
             raise InputError(f"--only takes {names}, or TASK=LABEL, not {word!r}")
     return [touch for touch in among if not words or touch.words.issuperset(words)]
+
+
+def changed(
+    meta: Mapping[str, Any],
+    before: Mapping[str, str],
+    labels: Mapping[str, str],
+    without: Sequence[str] = (),
+    *,
+    accepts: bool = False,
+) -> dict[str, str]:
+    """A recording's labels after a change.
+
+    Args:
+        meta: its metadata.
+        before: its labels before.
+        labels: {task: its new label}.
+        without: tasks whose label is taken away.
+        accepts: the other tasks that lack a label get that of their decision.
+    """
+    after = {**before, **labels}
+    if accepts:
+        after |= accepted(meta, after)
+    return {task: label for task, label in after.items() if task not in without}

@@ -2,14 +2,13 @@
 
 import shutil
 import textwrap
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from typing import Any
 
 from edge.decide.events import json_line
+from edge.errors import places_text
 
 LONGEST_LINE = 80
-MOST_PLACES = 6
-"""Taxels that a line for a person names."""
 Line = Mapping[str, Any]
 
 
@@ -26,16 +25,6 @@ def labels_text(labels: Mapping[str, str], between: str = ", ") -> str:
     'object=box, mobility=fixed'
     """
     return between.join(f"{task}={label}" for task, label in labels.items())
-
-
-def places_text(taxels: Sequence[Sequence[int]]) -> str:
-    """The first taxels of some.
-
-    >>> places_text([(3, 5), (0, 1)])
-    '[3, 5], [0, 1]'
-    """
-    more = " ..." if len(taxels) > MOST_PLACES else ""
-    return ", ".join(f"[{row}, {col}]" for row, col in taxels[:MOST_PLACES]) + more
 
 
 def event_text(line: Line) -> str:

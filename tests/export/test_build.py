@@ -31,13 +31,19 @@ def graph():
     return build, run
 
 
-def test_equal_constants_are_stored_once(graph):
-    build, _ = graph
-    assert build.constant(2.0) == build.constant(2.0)
-    assert build.constant([1, 2]) == build.constant([1, 2])
-    assert len({build.constant(v) for v in (2.0, [2.0], np.float32(2.0))}) == 3
-    assert build.constant(0.0) != build.constant(-0.0)
-    assert len(build.constants) == 5 + 1
+def test_a_constant_is_stored_once_and_a_literal_is_called_by_its_value():
+    build = Builder()
+    literals = (2.0, 2.0, [1, 2], [2.0], np.float32(2.0), 0.0, -0.0)
+    assert list(map(build.constant, literals)) == [
+        "float64 2.0",
+        "float64 2.0",
+        "int64 [1, 2]",
+        "float64 [2.0]",
+        "float32 2.0",
+        "float64 0.0",
+        "float64 -0.0",
+    ]
+    assert len(build.constants) == 6
 
 
 @pytest.mark.parametrize(
@@ -51,6 +57,6 @@ def test_equal_constants_are_stored_once(graph):
 )
 def test_the_sum_of_all_that_was_cut_off_is_given(graph, x, inside, off):
     build, run = graph
-    clipped, rest = build.clipped("x", [4.0])
+    clipped, rest = build.clipped("x", [4.0], "limit")
     np.testing.assert_array_equal(run(clipped, np.array([x])), [inside])
     np.testing.assert_array_equal(run(rest, np.array([x])), [[off]])

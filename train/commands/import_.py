@@ -16,7 +16,7 @@ from dataclasses import replace
 from importlib import import_module
 from pathlib import Path
 
-from edge.app.trial_options import add_arm, open_arm
+from edge.app.options import add_arm, open_arm
 from edge.errors import InputError, printable
 from edge.record.recording import Recording
 from edge.record.saving import save

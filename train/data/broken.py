@@ -3,9 +3,8 @@ recording."""
 
 import numpy as np
 
-from edge.app.output import counted
-from edge.app.texts import places_text
 from edge.arrays import Booleans, Integers
+from edge.errors import counted, places_text
 from edge.record.recording import Recording
 from edge.touch.layout import SkinLayout
 from edge.wire.skin.calibration import places

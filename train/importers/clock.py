@@ -12,8 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from edge.app.output import counted
-from edge.errors import InputError
+from edge.errors import InputError, counted
 from edge.touch.layout import RELEASE_S
 from train.progress import say
 

@@ -10,8 +10,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from edge.app.output import counted
-from edge.errors import InputError
+from edge.errors import InputError, counted
 from edge.record.recording import Recording
 from train.importers import clock
 from train.importers.axes import Axes

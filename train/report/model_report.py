@@ -12,10 +12,10 @@ import numpy as np
 from sklearn.metrics import precision_recall_fscore_support
 
 from edge.app.commands.explain import Explanation, Space, explain
-from edge.app.commands.info import doubt
-from edge.app.output import counted
 from edge.arrays import Integers
 from edge.decide.model import Model
+from edge.decide.summary import doubt
+from edge.errors import counted
 from train.data.labels import NO_CONTACT
 from train.data.vectors import Strings, Vectors
 from train.fitted import Fitted

@@ -5,9 +5,8 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from edge.app.commands.info import doubt
-from edge.app.output import counted
-from edge.errors import printable
+from edge.decide.summary import doubt
+from edge.errors import counted, printable
 from edge.features import names as measures
 from train.choose.settings import Chosen
 from train.data.dataset import DataSet

@@ -9,8 +9,8 @@ from pathlib import Path
 
 import numpy as np
 
-from edge.app.output import counted
 from edge.decide.statistics import wilson
+from edge.errors import counted
 from train.report.section import Row, Section, Table
 
 Numbers = dict[tuple[str, str, str], float]

@@ -7,8 +7,7 @@ from dataclasses import replace
 from itertools import chain
 from pathlib import Path
 
-from edge.app.output import counted
-from edge.errors import InputError
+from edge.errors import InputError, counted
 from train.data.dataset import DataSet, Measurement, load_trials
 from train.report.page import write
 from train.report.section import Section

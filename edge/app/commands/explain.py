@@ -11,15 +11,15 @@ from typing import Any, NamedTuple, Self
 
 import numpy as np
 
-from edge.app.commands.replay import contact_of
 from edge.app.options import add_file, apart
-from edge.app.output import Output, counted
+from edge.app.output import Output
 from edge.app.texts import wrapped
 from edge.arrays import Array, Booleans, Floats, Integers
 from edge.decide.graph import Graph
 from edge.decide.info import ModelInfo
 from edge.decide.model import Model
-from edge.errors import InputError
+from edge.decide.summary import contact_of
+from edge.errors import InputError, counted
 from edge.files import parsing
 from edge.record.recording import Recording, load
 from edge.record.saving import find
@@ -76,20 +76,20 @@ class Space(NamedTuple):
             def value(name: str) -> Array:
                 return graph.run([name], {"decision_point": np.array([last])})[0]
 
-            def constant(name: str) -> Array:
-                """A row for each decision point, of which the last counts."""
+            def constant(name: str, rank: int) -> Array:
+                """The last row, where decision points have different ones."""
                 array = graph.constants[f"{name} of {task}"]
-                return array[-1] if last else array
+                return array if array.ndim == rank else array[-1]
 
             unit = value(graph.makers[f"{task}_distances"].inputs[1])
             components = model.info.tasks[task].components
             columns = np.arange(model.info.width)
             if "Gather" in first:
                 columns = value(first["Gather"][1])
-            columns_of_rows = constant("columns").astype(np.float64)
+            columns_of_rows = constant("coordinates", 2).astype(np.float64)
             rows = columns_of_rows.T[:, :components] * (-0.5 * unit)
             # Trials without a label are infinitely far away.
-            rows[np.isinf(constant("lengths"))] = np.inf
+            rows[np.isinf(constant("lengths", 1))] = np.inf
             return cls(
                 columns=columns,
                 mean=value(first["Sub"][1]),

@@ -7,28 +7,17 @@ compares two on recordings.
 
 import argparse
 import json
-from collections.abc import Iterator, Mapping
 from typing import Any
 
 from edge.app.options import add_file
-from edge.app.output import Output, counted
+from edge.app.output import Output
 from edge.app.texts import wrapped
-from edge.decide.info import ModelInfo, Stopping
+from edge.decide.info import ModelInfo
 from edge.decide.metadata import to_json
 from edge.decide.model import Model
 from edge.decide.onnx_file import DIGITS
-
-MEASURED = (
-    "Of touches of each {} that it has not met, {unknown:.0%} are called unknown, "
-    "{unsure:.0%} are named with a confidence below 50 %, {sure:.0%} with more than "
-    "90 %; of those that it knows {known:.0%} are called unknown."
-)
-UNMEASURED = (
-    "How it answers for an unseen {} is not known: too few were in training for one to "
-    "be held out."
-)
-
-UNDOUBTED = "It names every touch without a doubt, also those of things it has not met."
+from edge.decide.summary import doubt
+from edge.errors import counted
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
@@ -83,17 +72,6 @@ def description(info: ModelInfo, about: dict[str, Any]) -> str:
     for sentence in _origin(info):
         lines += wrapped(sentence)
     return "\n".join(lines)
-
-
-def doubt(stopping: Mapping[str, Stopping]) -> Iterator[str]:
-    """A sentence on what a model's doubt about names is worth."""
-    if not stopping:
-        yield UNDOUBTED
-    for task, of_task in stopping.items():
-        if of_task.remoteness is not None:
-            worth = of_task.remoteness.worth
-            sentence = MEASURED if worth else UNMEASURED
-            yield sentence.format(task, **worth)
 
 
 def _origin(info: ModelInfo) -> list[str]:

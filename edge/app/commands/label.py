@@ -15,11 +15,11 @@ from pathlib import Path
 from typing import Any
 
 from edge.app import review
-from edge.app.output import Output, counted
-from edge.app.review import Touch
+from edge.app.options import task_label
+from edge.app.output import Output
+from edge.app.review import Touch, changed
 from edge.app.texts import labels_text
-from edge.app.trial_options import task_label
-from edge.errors import InputError
+from edge.errors import InputError, counted
 from edge.record.changes import FORMER, Change, Former, change, formers, now, undo
 from edge.record.labels import Standing, Table, read_table
 from edge.record.recording import read_meta
@@ -223,26 +223,3 @@ def _print(output: Output, touches: Sequence[Touch]) -> None:
         output.text(sentence)
     for sentence in slips(labels, [touch.place for touch in in_use]):
         output.text(f"probably a slip: {sentence}")
-
-
-def changed(
-    meta: Mapping[str, Any],
-    before: Mapping[str, str],
-    labels: Mapping[str, str],
-    without: Sequence[str] = (),
-    *,
-    accepts: bool = False,
-) -> dict[str, str]:
-    """A recording's labels after a change.
-
-    Args:
-        meta: its metadata.
-        before: its labels before.
-        labels: {task: its new label}.
-        without: tasks whose label is taken away.
-        accepts: the other tasks that lack a label get that of their decision.
-    """
-    after = {**before, **labels}
-    if accepts:
-        after |= review.accepted(meta, after)
-    return {task: label for task, label in after.items() if task not in without}

@@ -9,10 +9,8 @@ angles.
 from __future__ import annotations
 
 import argparse
-import math
 import os
 import re
-from collections import deque
 from collections.abc import Mapping, Sequence
 from contextlib import closing, suppress
 from dataclasses import dataclass, field
@@ -20,27 +18,30 @@ from itertools import count
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
-from edge.app.options import add_file, add_reading, within
+from edge.app.options import (
+    add_arm,
+    add_file,
+    add_reading,
+    open_arm,
+    task_label,
+    within,
+)
 from edge.app.output import LOG
 from edge.app.review import decisions_of
 from edge.app.sinks.event_writer import Lines
+from edge.app.sinks.sink import Event
 from edge.app.source import Opened, reading
-from edge.app.trial_options import add_arm, open_arm, task_label
-from edge.arrays import Array, Floats
+from edge.app.trials import Trials, recording, shared_meta
 from edge.decide.classifier import Classifier
-from edge.decide.events import Decided, Event
+from edge.decide.events import Decided
 from edge.decide.model import Model
 from edge.errors import InputError
 from edge.files import refusing
 from edge.record.labels import Row, read_table
-from edge.record.recording import Recording
 from edge.record.saving import save
 from edge.touch.arm import Chain
-from edge.touch.contact import Contact
 from edge.touch.frame import Frame
-from edge.touch.track import DEBOUNCE, ContactTracker
+from edge.wire.fake.player import frame_rate
 from edge.wire.skin import file as skinfile
 from edge.wire.skin.skin import Skin
 from edge.writing import NameTaken, check_writable
@@ -51,8 +52,6 @@ if TYPE_CHECKING:
 LONGEST_STEM = 60
 """Most characters of a file's name that come from labels. A name has at most 255 bytes,
 a character at most 4."""
-LEAD_S = 0.2
-"""Time that a trial keeps from before its onset."""
 LENGTH_S = 2.0
 """The paper decides 1.2 s after onset; the rest leaves room for longer windows."""
 
@@ -91,91 +90,6 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         help="longest time to keep after onset (default: %(default)s)",
     )
     add_arm(parser, "to be stored in each trial (without it, training assumes Cody's)")
-
-
-class Trials:
-    """Cuts a stream of frames into trials, one per contact.
-
-    A trial lasts from the lead-in before onset to the end of the contact, or to
-    `length_s` after onset. No other trial begins while a saved contact continues.
-    """
-
-    def __init__(self, skin: Skin, length_s: float) -> None:
-        self._tracker = ContactTracker(skin.layout, horizon_s=length_s)
-        self._length = length_s
-        self._before: deque[Frame] = deque(
-            maxlen=round(LEAD_S / skin.period_s) + DEBOUNCE
-        )
-        self._frames: list[Frame] | None = None
-        self._saved: Contact | None = None
-        self._onset_s = -math.inf
-
-    def push(self, frame: Frame) -> list[Frame] | None:
-        """Take in a frame; returns the frames of a trial that this frame completes."""
-        contact = next(iter(self._tracker.push(frame)), None)
-        if self._frames is not None:
-            self._frames.append(frame)
-        else:
-            self._before.append(frame)
-            if contact is None or contact is self._saved:
-                return None
-            self._saved = contact
-            self._onset_s = contact.onset_s
-            self._frames = list(self._before)
-        over = contact is None or contact.ended
-        return self.rest() if over or frame.t - self._onset_s >= self._length else None
-
-    @property
-    def under_way(self) -> bool:
-        """Whether the frames of a trial are being collected."""
-        return self._frames is not None
-
-    def rest(self) -> list[Frame] | None:
-        """End the trial that is under way, if any, and return its frames."""
-        frames = self._frames
-        self._frames = None
-        self._before.clear()
-        return frames
-
-
-def recording(frames: list[Frame], meta: dict[str, Any]) -> Recording:
-    """A recording of the frames, with NaN for joint angles that were not known."""
-    # A skin's frames always say which taxels are valid.
-    valid = _stacked(frames, "valid")
-    return Recording(
-        t=_stacked(frames, "t") - frames[0].t,
-        frames=_stacked(frames, "counts"),
-        joints=_angles(frames),
-        valid=None if valid.all() else valid,
-        meta=meta,
-        shear=None if frames[0].shear is None else _stacked(frames, "shear"),
-    )
-
-
-def _stacked(frames: list[Frame], field: str) -> Array:
-    """A field of all frames, along the first axis."""
-    return np.array([getattr(frame, field) for frame in frames])
-
-
-def _angles(frames: list[Frame]) -> Floats | None:
-    """(n, dof) joint angles; None where no frame has any."""
-    measured = [frame.joints for frame in frames if frame.joints is not None]
-    if not measured:
-        return None
-    unknown = np.full(len(measured[0]), np.nan)
-    return np.array([unknown if f.joints is None else f.joints for f in frames])
-
-
-def shared_meta(opened: Opened, arm: Chain | None) -> dict[str, Any]:
-    """The metadata that all trials of a skin share."""
-    file = opened.skin.file
-    meta = {
-        "skin": file.layout.to_dict(),
-        "skin_name": file.name,
-        "source": opened.source,
-        "rate_hz": file.reading.rate_hz,
-    }
-    return meta if arm is None else {**meta, "arm": arm.to_dict()}
 
 
 def trial_path(folder: Path, labels: dict[str, str]) -> Path:
@@ -220,8 +134,6 @@ def run(arguments: argparse.Namespace) -> int:
         ) as live,
         closing(live.lines()) as lines,
     ):
-        from edge.wire.fake.player import frame_rate  # counts the bits on a fake bus
-
         wire_s = round(1.0 / frame_rate(live.skin.file), 6)
         recorder = Recorder(
             arguments.out,
@@ -235,9 +147,9 @@ def run(arguments: argparse.Namespace) -> int:
         trials = Trials(live.skin, arguments.length)
         classifier = None if model is None else Classifier(model, live.skin.layout)
         for frame, faults in live.frames():
-            events = [] if classifier is None else classifier.push(frame)
-            lines.write([*faults, *(event.to_dict() for event in events)])
-            live.show(frame, faults, events)
+            events = faults + ([] if classifier is None else classifier.push(frame))
+            for sink in (lines, *live.sinks):
+                sink.push(frame, events)
             recorder.follow(trials, events)
             recorder.save(trials.push(frame), complete=True)
             if recorder.count == arguments.trials:

@@ -11,8 +11,9 @@ import argparse
 import numpy as np
 
 from edge.app.options import add_skin
-from edge.app.output import LOG, Output, counted
+from edge.app.output import LOG, Output
 from edge.app.source import chip_event, open_skin
+from edge.errors import counted
 from edge.wire.skin.loop import Loop
 from edge.wire.skin.skin import ChipStatus, Skin
 

@@ -21,14 +21,14 @@ from itertools import groupby
 import numpy as np
 
 from edge.app.options import add_file, add_reading
-from edge.app.output import Output, counted
+from edge.app.output import Output
 from edge.app.source import reading
 from edge.app.texts import event_text
 from edge.arrays import Bytes, Floats
 from edge.decide.classifier import Classifier
 from edge.decide.events import Event, Onset
 from edge.decide.model import Model
-from edge.errors import InputError
+from edge.errors import InputError, counted
 from edge.touch.frame import Frame
 from edge.touch.layout import SkinLayout
 from edge.touch.region import Region, find_regions
@@ -201,7 +201,8 @@ def run(arguments: argparse.Namespace) -> int:
         interval_s = 1.0 / RATE_HZ - 0.5 * live.skin.period_s
         for frame, faults in live.frames():
             events = [] if classifier is None else classifier.push(frame)
-            live.show(frame, faults, events)
+            for sink in live.sinks:
+                sink.push(frame, [*faults, *events])
             _follow(events, texts)
             if frame.t >= due:
                 due = frame.t + interval_s

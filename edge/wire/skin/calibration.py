@@ -1,18 +1,21 @@
-"""A skin's calibration, written into its file."""
+"""A skin's calibration: measured at rest, and written into the skin's file."""
 
+import math
 import os
 import re
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from pathlib import Path
 
 import numpy as np
 
-from edge.arrays import Booleans
+from edge.arrays import Booleans, Counts, Floats, Integers
 from edge.errors import InputError
 from edge.files import read_text
 from edge.wire.skin.decoder import dead_band
 from edge.wire.skin.file import SkinFile, TaxelCalibration, parse
+from edge.wire.skin.loop import Loop
+from edge.wire.skin.skin import Skin
 from edge.writing import write_whole
 
 CALIBRATION = re.compile(
@@ -97,3 +100,142 @@ def deaf_taxels(skin: SkinFile) -> list[tuple[int, int]]:
 def places(mask: Booleans) -> list[tuple[int, int]]:
     """(row, col) of the taxels of a mask (rows, cols)."""
     return [(row, col) for row, col in np.argwhere(mask).tolist()]
+
+
+FEWEST_FRAMES = 20
+SPREADS = 6.0
+"""Without a former calibration, a taxel stands out from the others of its kind by the
+onset and so many median deviations from their median."""
+MIN_SHARE = 0.5
+"""Smallest share of the frames in which a taxel must be valid."""
+NOISY = 10.0
+NOISY_COUNTS = 5.0
+"""A taxel is being touched, or broken, if its noise exceeds this factor times the
+median noise plus so many counts."""
+
+
+@dataclass(frozen=True)
+class Measurement:
+    """The rest values and noise of a skin.
+
+    Attributes:
+        calibration: mean and standard deviation of each taxel.
+        valid: (rows, cols) number of valid values.
+        frames: number of frames.
+    """
+
+    calibration: TaxelCalibration
+    valid: Integers
+    frames: int
+
+
+def measure(skin: Skin, frames: int, lasts_s: float = math.inf) -> Measurement:
+    """Measure rest values and noise, from sums of whole numbers.
+
+    Args:
+        skin: set up, and touched by nothing.
+        frames: the number of frames to read.
+        lasts_s: the greatest time to read for.
+    """
+    normal = Sums(skin.layout.shape)
+    tangential = Sums((*skin.layout.shape, 2))
+    count = 0
+    for count, _ in enumerate(Loop(skin, lasts_s=lasts_s).frames(), 1):
+        raw, valid = skin.raw()
+        normal.add(raw, valid)
+        if skin.shear is not None:
+            shear = skin.shear.raw.reshape(*skin.layout.shape, 2)
+            tangential.add(shear, valid[:, :, None])
+        if count == frames:
+            break
+    calibration = TaxelCalibration(*normal.mean_and_deviation())
+    if skin.layout.axes:
+        mean, deviation = tangential.mean_and_deviation()
+        calibration = replace(calibration, shear_baseline=mean, shear_noise=deviation)
+    return Measurement(calibration, normal.n, count)
+
+
+class Sums:
+    """Sums of valid values, in whole numbers.
+
+    Attributes:
+        n: (shape) number of valid values.
+    """
+
+    def __init__(self, shape: tuple[int, ...]) -> None:
+        self.n, self._total, self._squares = np.zeros((3, *shape), dtype=np.int64)
+
+    def add(self, raw: Counts, valid: Booleans) -> None:
+        """Add the values of a frame."""
+        # Squares of 16 bits over 2**31 frames still fit 63 bits.
+        values = np.where(valid, raw, 0).astype(np.int64)
+        self.n += valid
+        self._total += values
+        self._squares += values * values
+
+    def mean_and_deviation(self) -> tuple[Counts, Floats]:
+        """Rounded means and sample standard deviations; 0 where nothing was read.
+
+        Squared deviations are summed about the rounded mean in whole numbers, so that a
+        large mean loses no digits.
+        """
+        n = self.n
+        divisor = np.maximum(n, 1)
+        mean = (2 * self._total + divisor) // (2 * divisor)
+        deviations = self._squares - 2 * mean * self._total + n * mean * mean
+        remainder = self._total - n * mean
+        deviations = deviations - remainder * remainder / divisor
+        variance = deviations / np.maximum(n - 1, 1)
+        return mean.astype(np.uint16), np.sqrt(np.maximum(variance, 0.0))
+
+
+def unusable(
+    file: SkinFile,
+    baseline: Counts,
+    share: Floats,
+) -> Booleans:
+    """(rows, cols), True for working taxels without a usable rest value.
+
+    They were valid in less than `MIN_SHARE` of the frames, or rest at an end of the
+    chip's range: a saturated input, or 0 on a chip that does not rest there.
+
+    Args:
+        file: the skin's.
+        baseline: (rows, cols) rest values.
+        share: (rows, cols) shares of frames in which a taxel was valid.
+    """
+    rest = baseline.ravel()
+    bad = share.ravel() < MIN_SHARE
+    served = np.zeros(rest.size, dtype=bool)
+    for chip in file.chips:
+        taxels = chip.served
+        served[taxels] = True
+        bad[taxels] |= rest[taxels] >= chip.traits.highest
+        if not chip.kind.rests_at_zero:
+            bad[taxels] |= rest[taxels] == 0
+    return np.asarray((served & bad).reshape(baseline.shape) & file.layout.alive)
+
+
+def noisiest_taxels(noise: Floats) -> list[tuple[int, int]]:
+    """Taxels (row, col) that vary far more than the others, the worst first."""
+    limit = NOISY * float(np.median(noise)) + NOISY_COUNTS
+    return sorted(places(noise > limit), key=lambda taxel: -noise[taxel])
+
+
+def standing_out(file: SkinFile, baseline: Counts) -> Integers:
+    """Counts (rows, cols) by which working taxels rest beyond the usual differences to
+    others of their kind, in the direction of a touch.
+
+    A skin that is covered as a whole is not noticed.
+    """
+    change = np.zeros(baseline.size, dtype=np.int64)
+    for kind in {chip.kind for chip in file.chips}:
+        chips = [chip for chip in file.chips if chip.kind is kind]
+        taxels = np.concatenate([chip.served for chip in chips])
+        signs = np.concatenate([[chip.sign] * len(chip.served) for chip in chips])
+        rest = baseline.ravel()[taxels].astype(np.int64)
+        middle = int(np.median(rest))
+        above = (rest - middle) * signs
+        usual = int(SPREADS * np.median(np.abs(above)))
+        change[taxels] = np.maximum(above - usual, 0)
+    return np.where(file.layout.alive, change.reshape(baseline.shape), 0)

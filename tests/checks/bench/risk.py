@@ -26,6 +26,7 @@ the four that it never met.
 
 import tempfile
 from collections.abc import Mapping
+from copy import deepcopy
 from dataclasses import asdict, dataclass, replace
 from itertools import chain
 
@@ -129,7 +130,8 @@ def simulated(seed, kernels=None):
         ends = part(trial.recording, slice(None, None, len(trial.recording.t) - 1))
         trials.append(replace(trial, recording=replace(ends, joints=None)))
     X = np.stack([dataset.features(window) for window in POINTS_S])
-    return replace(dataset, trials=tuple(trials)), X
+    # A copy in memory: the temporary files end with this process.
+    return deepcopy(replace(dataset, trials=tuple(trials))), X
 
 
 def judged(drawn, labels):

@@ -16,8 +16,8 @@ import numpy as np
 import pandas as pd
 from joblib import cpu_count
 
-from edge.app.commands.replay import decide
 from edge.decide.model import Model
+from edge.decide.summary import decide
 from tests.checks.bench import tables
 from tests.checks.bench.mujoco_touch import (
     ONSET_COUNTS,

@@ -2,7 +2,7 @@
 
 from dataclasses import replace
 
-from edge.app.commands.info import UNDOUBTED
+from edge.decide.summary import UNDOUBTED
 from train.report.summary import candidates, details, summary
 
 

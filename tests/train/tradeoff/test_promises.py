@@ -12,8 +12,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from edge.app.commands.replay import decide
 from edge.decide.model import Model
+from edge.decide.summary import decide
 from edge.record.recording import load
 from tests.conftest import ROOT, rows_of
 from tests.train.tradeoff.test_tradeoff import board_file
@@ -22,7 +22,6 @@ from train.simulate import scene as scenes
 from train.simulate.run import write
 from train.tradeoff import costs
 from train.tradeoff import run as running
-from train.tradeoff.run import Options
 
 SCENE = ROOT / "train" / "scenes" / "cody18.toml"
 SEED = 4711
@@ -91,8 +90,8 @@ def folders(tmp_path_factory):
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(costs, "changes", lambda *_: [])
         patch.setattr(costs, "measure", lambda *_, **__: [])
-        options = Options(quick=True, jobs=2)
-        report = running.tradeoff([data], folder / "report", str(path), options)
+        out = folder / "report"
+        report = running.tradeoff([data], out, str(path), quick=True, jobs=2)
     return SimpleNamespace(report=report, fresh=folder / "fresh")
 
 

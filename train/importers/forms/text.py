@@ -18,9 +18,8 @@ from typing import Any
 
 import pandas as pd
 
-from edge.app.output import counted
 from edge.config import short_text
-from edge.errors import InputError, about
+from edge.errors import InputError, about, counted
 from train.importers.forms.file import File
 from train.importers.options import TableOptions
 from train.importers.table import EMPTY, Table, require_unique

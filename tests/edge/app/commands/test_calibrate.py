@@ -8,7 +8,10 @@ import numpy as np
 import pytest
 
 from edge.app.commands import calibrate
-from edge.app.commands.calibrate import (
+from edge.app.options import NOISE_COUNTS
+from edge.record import recording, saving
+from edge.wire.skin import file as skinfile
+from edge.wire.skin.calibration import (
     NOISY,
     NOISY_COUNTS,
     Sums,
@@ -17,9 +20,6 @@ from edge.app.commands.calibrate import (
     standing_out,
     unusable,
 )
-from edge.app.options import NOISE_COUNTS
-from edge.record import recording, saving
-from edge.wire.skin import file as skinfile
 from edge.wire.skin.decoder import dead_band
 from tests.edge.test_writing import left_by_a_dead_run
 

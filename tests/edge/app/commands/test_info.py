@@ -5,8 +5,9 @@ from dataclasses import replace
 import pytest
 
 from edge import demo
-from edge.app.commands.info import UNDOUBTED, described, description, doubt
+from edge.app.commands.info import described, description
 from edge.decide.model import Model
+from edge.decide.summary import UNDOUBTED, doubt
 
 INFO = Model(demo.MODEL).info
 

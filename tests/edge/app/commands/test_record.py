@@ -16,9 +16,10 @@ import pytest
 
 from edge import demo
 from edge.app import review
-from edge.app.commands.record import Recorder, Trials, trial_path
+from edge.app.commands.record import Recorder, trial_path
 from edge.app.sinks.event_writer import Lines
 from edge.app.source import ending_signals
+from edge.app.trials import Trials
 from edge.record.recording import load
 from edge.record.saving import save
 from edge.touch.frame import Frame

@@ -5,7 +5,7 @@ import sys
 import numpy as np
 import pytest
 
-from edge.app.commands.replay import Summary, compared
+from edge.decide.summary import Summary, compared
 from tests.conftest import decided, ended, python
 
 
