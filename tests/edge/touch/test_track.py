@@ -193,3 +193,8 @@ def test_a_touch_begins_by_an_event_alone_before_it_is_felt():
     assert first.ended
     assert first.touched_s == pytest.approx(0.39)
     assert not second.ended
+
+
+def test_a_frame_without_shear_is_named():
+    with pytest.raises(InputError, match="need shear, which a frame lacks"):
+        followed(replace(FLAT, axes=3), [pressed(FLAT, 0.0, {})])
