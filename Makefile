@@ -158,10 +158,6 @@ docs/touches.png docs/touches-dark.png: $(READY)
 	$(BIN)/python -m train show edge/demo/*.npz --model edge/demo/model.onnx \
 	  $(if $(findstring dark,$@),--dark) --out $@
 
-docs/touch.png: $(READY)
-	$(BIN)/python -m train simulate train/scenes/demo.toml --out $(OUT)/picture --seed 2012 --trials 1
-	$(BIN)/python -m train show $(OUT)/picture/cardboard-box-movable-00.npz --out $@
-
 BENCHVENV := $(VENV)/.bench
 
 $(BENCHVENV): $(DEV)

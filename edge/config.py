@@ -7,6 +7,7 @@ import json
 import math
 import os
 import reprlib
+import tomllib
 from collections.abc import Mapping, Sequence
 from typing import Any, Self
 
@@ -286,8 +287,6 @@ def parse_toml(text: str, where: str) -> ConfigTable:
     Raises:
         InputError: it is not TOML; the message begins with `where`.
     """
-    import tomllib  # most runs read no TOML file
-
     with parsing(where, "TOML"):
         return ConfigTable(tomllib.loads(text), where)
 

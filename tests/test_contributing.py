@@ -7,15 +7,20 @@ effect, `tests/export/test_c_code.py` a quantity.
 import json
 import re
 import sys
+from importlib import import_module
 
 import numpy as np
 import pytest
 from pandas import DataFrame
 
 import edge.app.commands
+import edge.app.sinks
 import train
 import train.importers
+from edge import demo
 from edge.app import cli
+from edge.app.commands import run
+from edge.decide.model import Model
 from edge.record.recording import load
 from tests.conftest import ROOT
 from train.__main__ import main
@@ -43,10 +48,9 @@ def test_each_file_and_name_of_the_table_exists(row):
 
 
 def test_the_table_has_each_kind():
-    kinds = "chip|quantity|feature set|lab's data|form|message|effect|subcommand|section".split(
-        "|"
-    )
-    for kind, row in zip(kinds, TABLE, strict=True):
+    kinds = "chip|quantity|feature set|lab's data|form|message|effect|sink|subcommand"
+    kinds += "|section"
+    for kind, row in zip(kinds.split("|"), TABLE, strict=True):
         assert kind in row
 
 
@@ -143,6 +147,40 @@ def test_a_subcommand_is_a_module_and_its_name(monkeypatch, tmp_path, capsys):
     with pytest.raises(SystemExit):
         cli.main(["--help"])
     assert re.search(r"toy +say a word", capsys.readouterr().out)
+
+
+SINK = '''"""A toy that counts."""
+
+def add_options(parser):
+    parser.add_argument("--toy", type=Path)
+
+def open_sink(arguments, opened, model):
+    return arguments.toy and Toy(arguments.toy)
+
+class Toy:
+    def __init__(self, path):
+        self.path, self.lines = path, []
+
+    def push(self, frame, events):
+        self.lines += [f"{frame.t:.2f} {event.to_dict()['event']}" for event in events]
+
+    def close(self):
+        self.path.write_text("\\n".join(self.lines))
+
+from pathlib import Path
+'''
+
+
+def test_a_sink_is_a_module_in_the_list(monkeypatch, tmp_path):
+    module(edge.app.sinks, monkeypatch, tmp_path, SINK)
+    toy = import_module("edge.app.sinks.toy")
+    monkeypatch.setattr(run, "SINKS", [*run.SINKS, toy])
+    touch = demo.FOLDER / "foam-block-fixed.npz"
+    words = ["--model", str(demo.MODEL), "--fake", str(touch)]
+    assert cli.main(["run", *words, "--toy", str(tmp_path / "events")]) == 0
+    lines = (tmp_path / "events").read_text().split("\n")
+    names = [line.split()[1] for line in lines]
+    assert names == ["onset", *["decision"] * len(Model(demo.MODEL).info.tasks)]
 
 
 def test_a_section_is_a_function_in_the_list(recordings, monkeypatch, tmp_path):

@@ -119,6 +119,35 @@ def test_what_is_slow_is_loaded_only_when_it_is_needed(program, left_out):
     assert python("-c", code).stdout == "[]\n"
 
 
+INSIDE = 15
+"""Imports within functions of edge: what is optional by nature, as a command, the driver
+of a chip or a bus, the page, the fake and early decisions."""
+
+
+def test_imports_stand_at_the_head():
+    inside = {
+        f"{path.relative_to(ROOT)}:{node.lineno}"
+        for path in modules("edge")
+        for function in ast.walk(parsed(path))
+        if isinstance(function, ast.FunctionDef | ast.AsyncFunctionDef)
+        for node in ast.walk(function)
+        if isinstance(node, ast.Import | ast.ImportFrom)
+    }
+    assert len(inside) <= INSIDE, sorted(inside)
+
+
+def test_only_the_top_floor_knows_commands():
+    """Training and export have its options and its way to run a program alone; no
+    command imports another, but where it lists them."""
+    for path in [*modules("train"), *modules("export")]:
+        app = {name for name in imported(path) if name.startswith("edge.app")}
+        app -= {"edge.app.cli", "edge.app.options", "edge.app.commands.explain"}
+        assert not app, path
+    for path in modules("edge"):
+        commands = [n for n in imported(path) if n.startswith("edge.app.commands")]
+        assert not commands or path.name == "cli.py", path
+
+
 def test_no_modules_import_each_other_in_a_circle():
     paths = {
         ".".join(path.relative_to(ROOT).with_suffix("").parts): path

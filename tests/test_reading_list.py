@@ -10,19 +10,10 @@ from tests.edge.wire.bus.shim import build as shim
 
 OPTIONAL = (
     "edge/wire/bus/serial_bus.py",
-    "edge/wire/chips/block.py",
     "edge/wire/chips/mpr121.py",
-    "edge/app/texts.py",
-    "edge/record/counts.py",
     "edge/decide/early.py",
-    "edge/decide/agreement.py",
     "edge/decide/graph.py",
-    "edge/decide/no_contact.py",
-    "edge/app/sinks/systemd.py",
-    "edge/record/recording.py",
-    "edge/touch/joint_stream.py",
-    "edge/touch/urdf.py",
-    "edge/writing.py",
+    "edge/app/sinks/web.py",
 )
 """Modules that neither this skin, nor the demo's model, nor an option calls for."""
 

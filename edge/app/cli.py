@@ -15,6 +15,7 @@ from functools import partial
 from importlib import import_module
 
 from edge import __version__
+from edge.app.commands import workstation
 from edge.errors import EdgeError, InputError
 from edge.interrupt import delayed
 
@@ -222,8 +223,6 @@ def main(argv: Sequence[str] | None = None) -> int:
         return 2
     if not first or first.startswith("-") or first in COMMANDS:
         return dispatch(top, words)
-    from edge.app.commands import workstation  # rarely needed
-
     if first in workstation.COMMANDS:
         return workstation.run(words)
     commands = [*COMMANDS, *workstation.COMMANDS]

@@ -6,6 +6,7 @@ import sys
 from collections.abc import Mapping
 from typing import Any, Self
 
+from edge.app.texts import event_text
 from edge.decide.events import json_line
 from edge.errors import printable
 
@@ -38,8 +39,6 @@ class Output:
         if self.as_json:
             return json_line(line)
         if text is None:
-            from edge.app.texts import event_text  # a service prints none
-
             text = event_text(line)
         return _printable_lines(text)
 

@@ -11,9 +11,10 @@ from typing import TYPE_CHECKING, Any
 
 from edge.app.output import LOG, Output
 from edge.app.sinks.event_writer import Lines
-from edge.decide.events import Event
+from edge.app.sinks.sink import Event, Fault, Sink
 from edge.errors import InputError
 from edge.touch.frame import Frame
+from edge.touch.joint_stream import open_joints
 from edge.touch.layout import for_device
 from edge.wire.skin import file as skinfile
 from edge.wire.skin.loop import Loop, Stop, stop_on
@@ -160,43 +161,29 @@ class Reading:
         """The skin."""
         return self.opened.skin
 
-    def frames(self) -> Iterator[tuple[Frame, list[dict[str, Any]]]]:
+    @property
+    def sinks(self) -> list[Sink]:
+        """The page, if there is one."""
+        return [] if self.page is None else [self.page]
+
+    def frames(self) -> Iterator[tuple[Frame, list[Event]]]:
         """Each frame, with the events of buses, taxels and chips that fail or return."""
-        skin = self.skin
         for frame in self.loop.frames():
-            events: list[dict[str, Any]] = []
-            t = frame.t
-            for name, lost in skin.bus_changes():
-                state = "lost" if lost else "back"
-                events.append({"event": "bus", "t": t, "bus": name, "state": state})
-            silent = skin.silent_changes()
-            if silent is not None:
-                taxels = {
-                    "event": "taxels",
-                    "t": t,
-                    "invalid": silent,
-                    "frames": SILENT_FRAMES,
-                }
-                events.append(taxels)
-            broken = skin.broken_changes()
-            if broken is not None:
-                events.append({"event": "broken", "t": t, "taxels": broken})
-            events += [chip_event(status, t=t) for status in skin.changes()]
-            yield frame, events
+            yield frame, [Fault(line) for line in self._faults(frame.t)]
 
-    def show(
-        self,
-        frame: Frame,
-        faults: Sequence[dict[str, Any]],
-        events: Sequence[Event] = (),
-    ) -> None:
-        """Show a frame on the page, if there is one."""
-        if self.page is not None:
-            from edge.app.texts import event_text  # most runs have no page
-
-            for fault in faults:
-                self.page.notice(event_text(fault).strip())
-            self.page.push(frame, events, self.loop.schedule)
+    def _faults(self, t: float) -> Iterator[dict[str, Any]]:
+        for name, lost in self.skin.bus_changes():
+            state = "lost" if lost else "back"
+            yield {"event": "bus", "t": t, "bus": name, "state": state}
+        silent = self.skin.silent_changes()
+        if silent is not None:
+            taxels = {"invalid": silent, "frames": SILENT_FRAMES}
+            yield {"event": "taxels", "t": t, **taxels}
+        broken = self.skin.broken_changes()
+        if broken is not None:
+            yield {"event": "broken", "t": t, "taxels": broken}
+        for status in self.skin.changes():
+            yield chip_event(status, t=t)
 
     def may_wait(self) -> bool:
         """Whether to wait for a slow reader: only in virtual time, until the end."""
@@ -258,13 +245,14 @@ def reading(
             lasts_s=opened.lasts_s,
             stop=stop,
         )
-        live = stack.enter_context(_page(arguments.web, opened, page))
+        live = stack.enter_context(_page(arguments.web, opened, loop, page))
         yield Reading(opened, loop, stop, live, Output.of(arguments))
 
 
 def _page(
     address: str | None,
     opened: Opened,
+    loop: Loop,
     options: Mapping[str, Any],
 ) -> AbstractContextManager[Page | None]:
     """The live page, where one is asked for."""
@@ -272,7 +260,8 @@ def _page(
         return nullcontext()
     from edge.app.sinks.page import open_page  # few runs have a page
 
-    return open_page(address, opened.skin.layout, title=opened.source, **options)
+    layout = opened.skin.layout
+    return open_page(address, layout, loop.schedule, title=opened.source, **options)
 
 
 def _angles(model: Model) -> int | None:
@@ -308,6 +297,4 @@ def _joints(
     """The joint angles that another program sends, or those of a played recording."""
     if option is None:
         return nullcontext(opened.playback if opened.dof else None)
-    from edge.touch.joint_stream import open_joints  # few arms send angles
-
     return open_joints(option, dof, names, opened.skin.clock.real)

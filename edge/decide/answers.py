@@ -2,10 +2,11 @@
 
 from dataclasses import replace
 
-from edge.decide.doubts import frame_doubts
+from edge.decide.doubts import frame_doubts, joint_doubts
 from edge.decide.events import Decided
 from edge.decide.info import ModelInfo
 from edge.decide.model import Decision, Model
+from edge.decide.unusual import unusual
 from edge.errors import OutOfRange
 from edge.touch.contact import Contact, FeatureSeries
 
@@ -54,8 +55,6 @@ def answers_about(
         is_unusual = score > info.novelty.limits[point]
         answer = answer.flagged(unusual=is_unusual)
         if is_unusual and window_s == info.window_s:
-            from edge.decide.unusual import unusual  # few contacts are unusual
-
             phrase = unusual(vector, info.widths, info.usual)
             answer = replace(answer, unusual=phrase)
     return {
@@ -73,8 +72,6 @@ def contact_doubts(
     """{flag: whether it holds} for a measured contact, see `edge.decide.flags`."""
     doubts = frame_doubts(series, window_s)
     if info.joints:
-        from edge.decide.doubts import joint_doubts  # not every model has joints
-
         limits = () if info.chain is None else info.chain.limits
         doubts |= joint_doubts(series, window_s, limits, info.still_s, info.speeds)
     return {

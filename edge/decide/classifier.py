@@ -11,10 +11,12 @@ from typing import TYPE_CHECKING
 from edge.decide.answers import answers_about
 from edge.decide.events import Decided, Event, Onset, Release
 from edge.decide.model import Model
+from edge.decide.no_contact import Untouched
 from edge.errors import InputError
 from edge.touch.contact import Contact
 from edge.touch.frame import Frame
 from edge.touch.layout import SkinLayout
+from edge.wire.skin.loop import Loop
 
 if TYPE_CHECKING:
     from edge.decide.early import Policy
@@ -140,8 +142,6 @@ class Classifier:
         self._end_s: float | None = None
         self._untouched: Untouched | None = None
         if any(task.no_contact is not None for task in model.info.tasks.values()):
-            from edge.decide.no_contact import Untouched  # few models know no contact
-
             self._untouched = Untouched(model, self.layout)
 
     def push(self, frame: Frame) -> list[Event]:
@@ -261,8 +261,6 @@ class Classifier:
         Raises:
             InputError: the skin does not suit the model, or joint angles are needed.
         """
-        from edge.wire.skin.loop import Loop  # a replay needs no bus
-
         if joints is None and not self._motion_on_skin:
             self.model.require_joints(None, "the skin")
         yield from self._afresh(

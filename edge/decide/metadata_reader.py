@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 
 from edge.config import ConfigTable, parse_json, short_text
+from edge.decide.agreement import factors_fit
 from edge.decide.info import (
     FORMAT,
     ModelInfo,
@@ -18,6 +19,7 @@ from edge.errors import InputError, about
 from edge.features.kernels import read_tables
 from edge.features.names import feature_types
 from edge.features.quantities import KERNELS
+from edge.touch.arm import Chain
 from edge.touch.frame import ONSETS
 from edge.touch.layout import SkinLayout
 
@@ -60,8 +62,6 @@ def _read(meta: ConfigTable) -> ModelInfo:
     arm = meta.get("arm", None)
     chain = None
     if arm is not None:
-        from edge.touch.arm import Chain  # few sensors are on an arm
-
         chain = Chain.from_dict(arm, where=f"{meta.where}: arm")
     stopping = {}
     novelty = None
@@ -232,8 +232,6 @@ def _contradictions_of_tasks(info: ModelInfo) -> Iterator[str]:
             yield f"task {name!r} takes other features, or in another order"
     labels = {name: task.labels for name, task in info.tasks.items()}
     for name, factors in info.products.items():
-        from edge.decide.agreement import factors_fit  # few models have products
-
         if not factors_fit(factors, labels, name):
             yield f"task {name!r} is not the product of its factors"
 

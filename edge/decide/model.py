@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 
 from edge.arrays import Array, Floats, Integers
 from edge.decide import onnx_file
+from edge.decide.agreement import agreed
 from edge.decide.engines import open_engine
 from edge.decide.info import METADATA_KEY, ModelInfo
 from edge.decide.metadata_reader import from_json
@@ -117,11 +118,6 @@ class Model:
         self._engine = open_engine(name, self.contents, engine)
         self.engine = self._engine.name
         self._check()
-        if self.info.products:
-            # Few models have products; the first decision is not to wait for an import.
-            from edge.decide.agreement import agreed
-
-            self._agreed = agreed
 
     def _check(self) -> None:
         """Refuse a graph whose inputs and outputs are not those of its metadata."""
@@ -241,7 +237,7 @@ class Model:
             raise self._refusal(x)
         for product, factors in self.info.products.items():
             # The nearest answer in which the three tasks agree.
-            agreed_labels, agreed_distances = self._agreed(product, factors, distances)
+            agreed_labels, agreed_distances = agreed(product, factors, distances)
             labels |= agreed_labels
             distances |= agreed_distances
         point = -1 if decision_point is None else decision_point

@@ -2,6 +2,7 @@
 tasks whose labels are made of two others' labels, as a category is softness by mobility.
 """
 
+import csv
 import io
 import logging
 import os
@@ -155,8 +156,6 @@ class Table:
         Raises:
             InputError: a task has the name of another column.
         """
-        import csv
-
         tasks = sorted(
             {task for standing in standings.values() for task in standing[0]}
         )
@@ -185,8 +184,6 @@ def read_table(folder: Path, column: str = FILE) -> Table:
     path = folder / TABLE
     if not os.path.lexists(path):
         return Table(path)
-    import csv  # few folders have a table
-
     contents = read_bytes(path)
     kind = "a table of labels"
     with parsing(str(path), kind, "; save it as CSV in UTF-8, or undo the change"):

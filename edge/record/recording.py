@@ -14,9 +14,11 @@ from numpy.typing import NDArray
 from edge.arrays import Array, Booleans, Counts, Floats
 from edge.config import ConfigTable
 from edge.errors import InputError, about
+from edge.record.counts import as_counts, in_rows
 from edge.record.labels import Table, plain, read_table
 from edge.record.npz import load_arrays, load_meta
 from edge.touch.frame import ONSETS, Frame
+from edge.touch.joint_angles import joint_columns
 from edge.touch.layout import SkinLayout
 
 SLOWEST_HZ = 2.0
@@ -101,8 +103,6 @@ class Recording:
         """
         if self.joints is None or self.joint_names in (None, tuple(names)):
             return self
-        from edge.touch.joint_angles import joint_columns  # few recordings need it
-
         with about(where):
             columns = joint_columns(self.joint_names or (), names)
         meta = {**self.meta, "joint_names": list(names)}
@@ -198,12 +198,8 @@ def _frames(
     """The counts (n, rows, cols) of at least one frame."""
     frames: Array = np.asarray(values)
     if frames.dtype.kind in "iuf" and (frames.dtype != np.uint16 or scale is not None):
-        from edge.record.counts import as_counts  # few files hold other numbers
-
         frames = as_counts(frames, scale)
     if frames.ndim == 2:
-        from edge.record.counts import in_rows  # few files hold flat frames
-
         frames = in_rows(frames, skin.get("rows"), skin.get("cols"))
     if frames.dtype != np.uint16 or frames.ndim != 3:
         raise InputError(

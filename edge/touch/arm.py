@@ -15,6 +15,7 @@ from edge.arrays import Floats
 from edge.config import ConfigTable, read_toml, short_text
 from edge.elementary import MOST_RAD, cos, length, sin
 from edge.errors import InputError, about
+from edge.touch.urdf import arm_between
 
 Vector = tuple[float, float, float]
 ZERO: Vector = (0.0, 0.0, 0.0)
@@ -234,8 +235,6 @@ class Chain:
         Raises:
             InputError: the file cannot be read, or no chain leads from `base` to `tip`.
         """
-        from edge.touch.urdf import arm_between
-
         return cls.from_dict(arm_between(path, base, tip), where=os.fspath(path))
 
 

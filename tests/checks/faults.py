@@ -1,20 +1,22 @@
 """How the skin takes the faults of its wires, judged by the counts that its chips
 really felt.
 
-`python -m tests.checks.faults` prints tables. The first has the share of valid frames by the
-share of faults, for each kind of bus. Then scripts of faults, and the loss of all
+`make faults` writes two tables. The first has the share of valid frames by the share of
+faults, for each kind of bus. For the second, scripts of faults, and the loss of all
 settings between two frames, are played onto fake skins in virtual time, which advances
-with the bits on the wire and with the software's overhead for each transaction. Last, one
+with the bits on the wire and with the software's overhead for each transaction. Then one
 fault of each kind is played at every transaction of a frame and of the set-up; `--every
-10` takes every tenth. The exit status is 1 if fewer frames are valid than `LEAST_VALID`
-asks for, a valid value is wrong, or a taxel is not valid again within half a second of
-the fault's end. The tests of `edge.wire.skin.bus_reader` play a part of this.
+10` takes every tenth. A row holds the plays of its name on all skins and with all
+overheads. The exit status is 1 if fewer frames are valid than `LEAST_VALID` asks for, a
+valid value is wrong, or a taxel is not valid again within half a second of the fault's
+end. The tests of `edge.wire.skin.bus_reader` play a part of this.
 """
 
 import errno
 import math
 import sys
-from dataclasses import dataclass, replace
+from collections import defaultdict
+from dataclasses import astuple, dataclass, replace
 from itertools import count
 
 import numpy as np
@@ -34,8 +36,8 @@ from tests.faulty import Fault, Route, faulty_buses, one_bus
 from tests.serial_line import LineBus
 from train.threads import in_processes
 
-OVERHEADS_US = (0.0, 50.0, 100.0)
-"""Microseconds a transaction."""
+OVERHEADS_S = (0.0, 50e-6, 100e-6)
+"""Of a transaction."""
 BACK_S = 0.5
 """Time after a fault's end within which every taxel must be valid again."""
 BEGIN_S = 0.5
@@ -156,7 +158,7 @@ class Outcome:
     """The effect of a script of faults on a skin.
 
     Attributes:
-        name: of the script.
+        name: of the script; with a * the protocol cannot tell its faults.
         met: transactions that met a fault; positions tried in a sweep.
         wrong: values called valid that no chip felt.
         missing: most invalid taxels of one frame.
@@ -185,6 +187,16 @@ class Outcome:
             "ticks left out": self.missed_ticks,
             "all back after, ms": f"{1e3 * self.back_s:.0f}",
         }
+
+
+def worst(name, outcomes):
+    """The outcomes of several plays as one."""
+    columns = zip(*map(astuple, outcomes), strict=True)
+    _, met, wrong, missing, elsewhere, ticks, back_s = columns
+    back = math.nan if any(map(math.isnan, back_s)) else max(back_s)
+    return Outcome(
+        name, sum(met), sum(wrong), max(missing), sum(elsewhere), sum(ticks), back
+    )
 
 
 class Watched:
@@ -217,13 +229,6 @@ class Watched:
             self.back_at = self.skin.clock.now()
         return frame
 
-    def spare(self, file, faults):
-        """Count the readings lost on chips that no fault may meet."""
-        for bus in file.buses:
-            for chip in bus.chips:
-                met = any(touches(fault, bus, chip) for fault in faults)
-                self.spared.flat[list(chip.taxels)] = not met
-
     def reset(self):
         """Reset every chip and mux."""
         for bus in self.buses:
@@ -254,6 +259,16 @@ def touches(fault, bus, chip):
     return meets and fault.bus in (None, bus.device)
 
 
+def spared(file, faults):
+    """Which taxels are of chips that no fault may meet."""
+    spared = np.ones(file.layout.shape, dtype=bool)
+    for bus in file.buses:
+        for chip in bus.chips:
+            if any(touches(fault, bus, chip) for fault in faults):
+                spared.flat[list(chip.taxels)] = False
+    return spared
+
+
 def run(name, file, faults=(), *, resets=(), seconds=LASTS_S, overhead_s=0.0):
     """Play a script for some seconds; reset every chip and mux before each of the
     numbered frames.
@@ -262,7 +277,7 @@ def run(name, file, faults=(), *, resets=(), seconds=LASTS_S, overhead_s=0.0):
     """
     watched = Watched(file, overhead_s=overhead_s)
     if faults:
-        watched.spare(file, faults)
+        watched.spared = spared(file, faults)
     with watched.skin as skin:
         start = skin.clock.now()
         moved = [fault.later(start) for fault in faults]
@@ -281,6 +296,15 @@ def run(name, file, faults=(), *, resets=(), seconds=LASTS_S, overhead_s=0.0):
     return watched.outcome(name, met, end, schedule.missed_ticks)
 
 
+def wires(file, feels, clock, overhead_s):
+    """Fake buses of a skin that take faults."""
+    if not file.buses[0].serial:
+        return faulty_buses(file, feels, clock, timed=True, overhead_s=overhead_s)
+    buses = fake_buses(file, feels, clock, make=LineBus)
+    buses[0].plug(file.chips[0].traits.frame_bytes)
+    return buses
+
+
 def share(kind, rate, *, seconds=10.0, overhead_s=50e-6):
     """Play a kind of `SHARES` at a rate on chips that have run well for a second."""
     name, fault = SHARES[kind]
@@ -288,29 +312,23 @@ def share(kind, rate, *, seconds=10.0, overhead_s=50e-6):
     faults = [replace(fault, rate=rate)]
     clock = VirtualClock()
     feels = Pattern(file)
-    if file.buses[0].serial:
-        buses = fake_buses(file, feels, clock, make=LineBus)
-        buses[0].plug(file.chips[0].traits.frame_bytes)
-    else:
-        buses = faulty_buses(file, feels, clock, timed=True, overhead_s=overhead_s)
-    met = np.zeros(file.layout.shape, dtype=bool)
-    for bus in file.buses:
-        for chip in bus.chips:
-            met.flat[list(chip.taxels)] = touches(faults[0], bus, chip)
+    buses = wires(file, feels, clock, overhead_s)
+    met = ~spared(file, faults)
     valid = []
-    first = 100
     with Skin(file, buses, clock=clock) as skin:
         skin.start()
         schedule = Schedule(clock, skin.period_s)
+        for _ in range(100):
+            schedule.wait(Stop())
+            skin.read()
+        for bus in buses:
+            bus.inject(faults)
+        first = schedule.tick
         while schedule.tick < first + seconds / skin.period_s:
             schedule.wait(Stop())
             frame = skin.read()
-            if schedule.tick == first:
-                for bus in buses:
-                    bus.inject(faults)
-            elif schedule.tick > first:
-                assert feels.wrong(frame) == 0
-                valid.append(frame.valid)
+            assert feels.wrong(frame) == 0
+            valid.append(frame.valid)
     ticks = schedule.tick - first
     good = sum(v[met].all() for v in valid)
     beside = math.nan if met.all() else sum(v[~met].all() for v in valid) / ticks
@@ -335,13 +353,7 @@ def sweep(name, file, fault, *, set_up=False, every=1, first=0, overhead_s=0.0):
         for position in range(first, bus.carried, every):
             once = replace(fault, at=[position], bus=bus.name)
             outcomes.append(_one_fault(file, once, set_up, overhead_s))
-    return Outcome(
-        f"{name}, {'set-up' if set_up else 'frame'}",
-        met=len(outcomes),
-        wrong=sum(outcome.wrong for outcome in outcomes),
-        missing=max((outcome.missing for outcome in outcomes), default=0),
-        back_s=max((outcome.back_s for outcome in outcomes), default=0.0),
-    )
+    return worst(name, outcomes)
 
 
 def _one_fault(file, fault, set_up, overhead_s):
@@ -398,63 +410,59 @@ def scripts():
     yield "a chip that serves the same bytes on and on *", cody, [Fault("hold", **chip)]
 
 
-def plays(overhead_s):
-    """The scripts, and the loss of all settings, once and again."""
-    for name, file, faults in scripts():
-        yield delayed(run)(name, file, faults, overhead_s=overhead_s)
-    for name, file in SKINS.items():
-        for resets in (REPEATED[:1], REPEATED):
-            words = f"all reset {len(resets)} times, {name}"
-            yield delayed(run)(words, file, resets=resets, overhead_s=overhead_s)
+def plays():
+    """The scripts, and the loss of all settings, once and again, with each overhead."""
+    for overhead_s in OVERHEADS_S:
+        for name, file, faults in scripts():
+            yield delayed(run)(name, file, faults, overhead_s=overhead_s)
+        for skin, file in SKINS.items():
+            for resets in (REPEATED[:1], REPEATED):
+                name = f"all reset {len(resets)} times, {skin}"
+                yield delayed(run)(name, file, resets=resets, overhead_s=overhead_s)
 
 
-def sweeps(overhead_s, every):
+def sweeps(every):
     """Each fault that the protocol can tell, at each transaction of each skin."""
-    options = {"every": every, "overhead_s": overhead_s}
-    for name, file in SKINS.items():
-        for kind, fault in KINDS.items():
-            for set_up in (False, True):
-                words = f"{kind}, {name}"
-                yield delayed(sweep)(words, file, fault, set_up=set_up, **options)
+    for overhead_s in OVERHEADS_S:
+        options = {"every": every, "overhead_s": overhead_s}
+        for file in SKINS.values():
+            for kind, fault in KINDS.items():
+                yield delayed(sweep)(f"one {kind}, frame", file, fault, **options)
+                name = f"one {kind}, set-up"
+                yield delayed(sweep)(name, file, fault, set_up=True, **options)
 
 
 def shares():
-    """Print the table of `SHARES`; the rows that break a promise."""
+    """The table of `SHARES`, and the rows that break a promise."""
     jobs = [delayed(share)(kind, rate) for kind in SHARES for rate in LEAST_VALID]
     outcomes = in_processes(-1, jobs, "shares")
     rows = []
     broken = []
     for kind in SHARES:
-        row = {"fault": kind}
+        row = {"frames of which a chip is valid": kind}
         for rate, least in LEAST_VALID.items():
             outcome = next(outcomes)
-            row[f"valid at {rate:.0%}"] = f"{outcome.valid:.1%}"
+            row[f"faults {rate:.0%}"] = f"{outcome.valid:.1%}"
             if outcome.valid < least or (rate == 1.0 and outcome.beside < LEAST_BESIDE):
                 broken.append(f"{kind} at {rate:.0%}")
         is_alone = math.isnan(outcome.beside)
-        row["others, at 100%"] = "" if is_alone else f"{outcome.beside:.1%}"
+        row["other chips at 100%"] = "" if is_alone else f"{outcome.beside:.1%}"
         rows.append(row)
-    print("\nFrames of which the faulty chip is valid, of all that were due:\n")
-    print(tables.markdown(rows), flush=True)
-    return broken
+    return rows, broken
 
 
 def measure(every):
-    """Print the shares, and play all scripts and sweeps with each overhead, a table
-    each; 1 if a promise is broken."""
-    broken = shares()
-    for overhead_us in OVERHEADS_US:
-        words = f"{overhead_us:g} us"
-        overhead_s = overhead_us * 1e-6
-        jobs = [*plays(overhead_s), *sweeps(overhead_s, every)]
-        outcomes = list(in_processes(-1, jobs, words))
-        print(f"\nOverhead of {words} a transaction:\n")
-        print(tables.markdown([outcome.row() for outcome in outcomes]), flush=True)
-        for outcome in outcomes:
-            held = outcome.wrong == 0 and outcome.back_s <= BACK_S
-            if not (held or outcome.name.endswith("*")):
-                broken.append(f"{outcome.name} ({words})")
-    print("\n\\* The protocol cannot tell: see `scripts` in tests/checks/faults.py.")
+    """Write the tables of shares and of outcomes; 1 if a promise is broken."""
+    rows, broken = shares()
+    by_name = defaultdict(list)
+    for outcome in in_processes(-1, [*plays(), *sweeps(every)], "outcomes"):
+        by_name[outcome.name].append(outcome)
+    outcomes = [worst(name, outcomes) for name, outcomes in by_name.items()]
+    tables.write("faults", [rows, [outcome.row() for outcome in outcomes]])
+    for outcome in outcomes:
+        held = outcome.wrong == 0 and outcome.back_s <= BACK_S
+        if not (held or outcome.name.endswith("*")):
+            broken.append(outcome.name)
     if broken:
         print(f"not as promised: {'; '.join(broken)}", file=sys.stderr)
     return 1 if broken else 0

@@ -1,7 +1,7 @@
 """Draw recordings.
 
-Draws a recording: frames over time with the contact region, and the three features.
-Draws several recordings, or the decisions of --model, side by side.
+Draws the first contact of each recording: the skin at its strongest frame and the three
+features, and the decisions of --model.
 """
 
 import argparse
@@ -17,7 +17,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     option(
         "recording",
         nargs="+",
-        help="an .npz recording, or several to compare",
+        help="an .npz recording, or several side by side",
     )
     text = "whose decisions are drawn"
     add_file(parser, "model", text)
@@ -29,7 +29,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     option(
         "--dark",
         action="store_true",
-        help="draw several recordings for a dark page",
+        help="draw for a dark page",
     )
 
 
@@ -37,21 +37,14 @@ def run(arguments: argparse.Namespace) -> int:
     """Draw, and say where."""
     from edge.decide.model import Model
     from edge.record.recording import load
-    from train.draw import comparison
-    from train.draw.recording import draw
+    from train.draw import draw
 
     models, recordings = apart(arguments.recording, arguments.model)
     if len(models) > 1 or not recordings:
         raise InputError("give recordings to draw, and at most one model.onnx")
-    first = recordings[0]
-    out = Path(arguments.out or Path(first).with_suffix(".png"))
-    if models or len(recordings) > 1:
-        touches = [(path, load(path)) for path in recordings]
-        model = Model(models[0]) if models else None
-        comparison.draw(touches, out, model=model, dark=arguments.dark)
-    elif arguments.dark:
-        raise InputError("--dark is for several recordings")
-    else:
-        draw(load(first), out, where=first)
+    out = Path(arguments.out or Path(recordings[0]).with_suffix(".png"))
+    touches = [(path, load(path)) for path in recordings]
+    model = Model(models[0]) if models else None
+    draw(touches, out, model=model, dark=arguments.dark)
     print(out)
     return 0

@@ -66,8 +66,3 @@ def remarks(scene: "Scene", written: "Written") -> Iterator[str]:
             f"in {written.unfelt} of them no taxel rises above skin.onset_counts "
             f"({scene.skin.onset}), so no touch is felt"
         )
-    for key, error in written.rough.items():
-        yield (
-            f"{key} and its kind: no step is within trials.tolerance; the step taken "
-            f"errs by {100.0 * error:.2g} % of the peak force (see --explain)"
-        )

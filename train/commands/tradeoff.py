@@ -20,14 +20,14 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     option("--board", metavar="board.json", help=text)
     text = "only see whether there are enough recordings, before the long work"
     option("--check", action="store_true", help=text)
-    text = "try few candidates at each window; the table of savings has all as a row"
+    text = "try few candidates at each window"
     option("--quick", action="store_true", help=text)
     option("--task", help="task of front.json (default: category, or else the first)")
 
 
 def run(arguments: argparse.Namespace) -> int:
     """Work and write."""
-    from train.tradeoff.run import Options, require_enough, tradeoff
+    from train.tradeoff.run import require_enough, tradeoff
 
     if arguments.check:
         require_enough(len(find(arguments.data)))
@@ -35,10 +35,6 @@ def run(arguments: argparse.Namespace) -> int:
     check_writable(arguments.out)  # before the work
     if arguments.board is None:
         raise InputError("give --board board.json, which `edge-classify bench` writes")
-    options = Options(
-        task=arguments.task,
-        quick=arguments.quick,
-        jobs=arguments.jobs,
-    )
-    print(tradeoff(arguments.data, arguments.out, arguments.board, options))
+    options = {name: getattr(arguments, name) for name in ("task", "quick", "jobs")}
+    print(tradeoff(arguments.data, arguments.out, arguments.board, **options))
     return 0

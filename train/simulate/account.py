@@ -1,35 +1,40 @@
-"""The account of a scene: the effects that its trials call for, and their steps."""
+"""The account of a scene: the effects that its trials call for, and the error of their
+steps."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 
-from train.simulate.convergence import Convergence, Kind, kinds, measure
-from train.simulate.plan import required_effects
-from train.simulate.scene_model import Scene, TrialSpec
+import numpy as np
+
+from train.simulate.engine import run_physics
+from train.simulate.plan import kinds, required_effects
+from train.simulate.scene_model import Scene, TrialSpec, Value
 from train.simulate.schema import SHARED
+
+FINER = 16
+"""Steps of the reference run within a step of the trials."""
+MOST_OBJECTS = 8
+"""Most objects of a kind whose steps are measured; they are spread over its list."""
 
 
 def explain(scene: Scene) -> str:
     """The account that `simulate --explain` prints."""
-    first_kinds = kinds(scene)
-    by_kind = measure(scene, first_kinds)
-    trials_by_kind = kinds(scene, None if scene.step_s else by_kind)
     lines = []
-    for effects, specs in trials_by_kind.items():
-        lines += ["", *_of_kind(scene, effects, specs, by_kind[effects])]
+    for effects, specs in kinds(scene).items():
+        lines += ["", *_of_kind(scene, effects, specs)]
     return "\n".join(lines[1:])
 
 
 def _of_kind(
-    scene: Scene,
-    effects: Kind,
-    specs: Sequence[TrialSpec],
-    convergence: Convergence,
+    scene: Scene, effects: Sequence[str], specs: Sequence[TrialSpec]
 ) -> list[str]:
-    """The lines of a kind of trials."""
+    """The lines of trials that call for the same effects."""
     first = {spec.key: spec for spec in specs}
+    step_ms = 1e3 * specs[0].step_s
     lines = [
         f"{', '.join(sorted(first))}: {len(specs)} trials",
-        _step_line(specs[0].step_s, convergence, scene),
+        f"  step {step_ms:.3g} ms errs by {step_error(scene, specs):.2%} of the peak "
+        f"force, beside steps of {step_ms / FINER:.2g} ms",
         f"  {'effect':<16}called for by",
     ]
     for name, users in SHARED.items():
@@ -44,20 +49,40 @@ def _of_kind(
     return lines
 
 
-def _step_line(step_s: float, measured: Convergence, scene: Scene) -> str:
-    """The step that the trials take, and the errors of the steps tried."""
-    errors = ", ".join(
-        f"{100.0 * e:.2g} % at {1e3 * s:.3g} ms"
-        for s, e in zip(measured.steps_s, measured.errors, strict=False)
+def step_error(scene: Scene, specs: Sequence[TrialSpec]) -> float:
+    """The error of the force that the step of trials leaves, as a part of its peak.
+
+    It is the root mean square over time of the distance from a run of steps `FINER`
+    times as short, until the end of the window in which labels are judged, of the worst
+    object. Each object has the value in the middle of every range.
+    """
+    after_s = min(scene.trials["after_s"], scene.labels["window_s"])
+    scene = replace(
+        scene,
+        trials={**scene.trials, "after_s": after_s},
+        spread={},
+        lead=_middle(scene.lead),
+        taxel_n_m=_middle(scene.taxel_n_m),
     )
-    goal = f"{100.0 * scene.trials['tolerance']:g} %"
-    best = f"{1e3 * measured.step_s:g} ms"
-    verdict = f"{best} is enough for {goal}"
-    if not measured.within:
-        verdict = f"no step is within {goal}, and {best} errs by {100.0 * measured.error:.2g} %"
-    return (
-        f"  step {1e3 * step_s:g} ms errs by {100.0 * measured.error_as_given:.2g} %; "
-        f"{verdict} (error {errors}; beside a reference run at "
-        f"{1e3 * measured.steps_s[-1]:.2g} ms, which the last halving of its step "
-        f"changed by {100.0 * measured.change:.2g} %)"
+    first = list({spec.key: spec for spec in reversed(specs)}.values())
+    middle = []
+    for spec in first[:: -(-len(first) // MOST_OBJECTS)]:
+        values = {key: _middle(value) for key, value in spec.object.values.items()}
+        middle.append(replace(spec, object=replace(spec.object, values=values)))
+    force, reference = (
+        run_physics(
+            scene,
+            tuple(replace(spec, step_s=spec.step_s / times) for spec in middle),
+            images=False,
+        ).force
+        for times in (1, FINER)
     )
+    peak = reference.max(axis=1)
+    error = np.sqrt(np.mean((force - reference) ** 2, axis=1))
+    return float(np.max(error / np.where(peak > 0.0, peak, 1.0)))
+
+
+def _middle(value: Value) -> Value:
+    """The value halfway between the limits, without a range."""
+    middle = 0.5 * (value.low + value.high)
+    return Value(middle, middle)

@@ -64,7 +64,6 @@ class Clock(Group):
             frame, and still to come in it.
         frame: number of frames ended.
         t, h: seconds now, and seconds of a step.
-        longest_s: seconds of the longest step that resolves how an object swings.
     """
 
     usual: Places
@@ -73,7 +72,6 @@ class Clock(Group):
     frame: Places
     t: Array
     h: Array
-    longest_s: Array
 
 
 @dataclass
@@ -183,7 +181,6 @@ class Bed(Group):
         row_force: (rows, n) newtons on each row in the last step; where the forearm
             does not pivot, the first row holds the sum.
         first_row_force: (n,) which is row_force[0].
-        swing_k: (n,) newtons a metre on which a light object swings.
         lost: (n,) whether the solver failed to find a contact's loads.
     """
 
@@ -205,7 +202,6 @@ class Bed(Group):
     load: PerRow
     row_force: PerRow
     first_row_force: Array
-    swing_k: Array
     lost: Mask
 
 

@@ -6,6 +6,7 @@ effect (`trials.Trials`). `base` has the hooks of all trials, which run first in
 stage.
 """
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from importlib import import_module
@@ -55,21 +56,17 @@ TRACE = "trace"
 """Returns {name: (m,)} of what a run keeps at each frame."""
 TRACTION = "traction"
 """Returns (2, rows, C, m) newtons, the taxels' tangential load."""
-RESOLVE = (
-    "hang",  # the stiffness on which a light object swings
-    "resolve",  # the longest step that resolves that swing
-)
 SENSOR = (
     "clock",  # the frames' times
     "sensor",  # the readings
 )
 ANSWER = "answer"
 """The solver of a contact, which `press` calls."""
-INSTEAD = ("lay", "law", "hang", "locate", ANSWER, "share", "bear", "image")
+INSTEAD = ("lay", "law", "locate", ANSWER, "share", "bear", "image")
 """Stages in which a trial runs a single hook: that of the last of its effects with such
 a hook."""
 STAGES = (
-    *(*SETUP, *RESOLVE, *PACE, *TUNE, *FRAME, *STEP, ANSWER),
+    *(*SETUP, *PACE, *TUNE, *FRAME, *STEP, ANSWER),
     *(*SAMPLE, TRACE, TRACTION, *SENSOR),
 )
 
@@ -147,6 +144,19 @@ def _hooks(stage: str, owners: Sequence[tuple[str, Any, Mask]]) -> list[Call]:
             hooks = [replace(call, which=call.which & ~mask) for call in hooks]
         hooks.append(Call(owner, function, mask))
     return [call for call in hooks if call.which.any()]
+
+
+def kinds(scene: Scene) -> dict[tuple[str, ...], list[TrialSpec]]:
+    """{effects: the trials of a scene that call for them}, at the smallest step that the
+    scene gives one of these effects, or all."""
+    out: dict[tuple[str, ...], list[TrialSpec]] = {}
+    for item, condition in scene.kinds:
+        effects = tuple(required_effects(scene, item, condition))
+        step_s = min(scene.step_s.get(name, math.inf) for name in ("base", *effects))
+        out.setdefault(effects, []).extend(
+            TrialSpec(item, condition, k, step_s) for k in range(scene.count)
+        )
+    return out
 
 
 def required_effects(scene: Scene, item: SceneObject, condition: str) -> dict[str, str]:
@@ -250,20 +260,9 @@ def check_heeded(scene: Scene, where: str) -> None:
                 )
 
 
-def given_steps(scene: Scene) -> str:
-    """The steps that a scene gives, as a sentence; "" where they are measured."""
-    if not scene.step_s:
-        return ""
-    steps = ", ".join(f"{name} {1e3 * s:g} ms" for name, s in scene.step_s.items())
-    reason = scene.step_reason or "the scene gives no reason"
-    return (
-        f"steps that the scene gives, whatever trials.tolerance says: {steps}; {reason}"
-    )
-
-
 def summary(scene: Scene) -> list[str]:
-    """Lines on the effects that a scene's trials call for, those that none does, and
-    steps that are not measured."""
+    """Lines on the effects that a scene's trials call for, and those that none
+    does."""
     counts = dict.fromkeys(EFFECTS, 0)
     trials = scene.count * len(scene.kinds)
     for item, condition in scene.kinds:
@@ -275,5 +274,4 @@ def summary(scene: Scene) -> list[str]:
         f"effects, with the trials of {trials} that call for them: "
         f"{', '.join(entries) or 'none'}",
         f"not called for, and not loaded: {', '.join(unused) or 'none'}",
-        *filter(None, [given_steps(scene)]),
     ]

@@ -12,8 +12,8 @@ from edge.record import saving
 from edge.record.recording import Recording
 from edge.writing import check_writable
 from train.simulate.arm import Array, Places
-from train.simulate.convergence import Convergence, Kind, kinds, measured
 from train.simulate.engine import PhysicsRun, batch_size, readings
+from train.simulate.plan import kinds
 from train.simulate.readings import Readings
 from train.simulate.scene_model import Scene, TrialSpec
 from train.simulate.schema import FAMILIES
@@ -28,15 +28,11 @@ class Written:
         paths: the files.
         redrawn: {reason: number of trials that were drawn again for it at first}.
         unfelt: number of trials in which no taxel rises above the skin's onset.
-        rough: {the first object and condition of a kind: the error of its step, as a
-            part of the peak force} where the step was measured and none is within the
-            scene's tolerance.
     """
 
     paths: list[Path]
     redrawn: dict[str, int]
     unfelt: int
-    rough: dict[str, float]
 
 
 def file_name(scene: Scene, trial: TrialSpec) -> str:
@@ -104,17 +100,9 @@ def simulate_trials(
         yield from recordings(run.physics, run.which)
 
 
-def batches_of(
-    scene: Scene, convergences: dict[Kind, Convergence] | None = None
-) -> list[tuple[TrialSpec, ...]]:
-    """Batches of the scene's trials, of about equal work.
-
-    Args:
-        convergences: the measured steps (`measured`), for a scene that gives no step.
-    """
-    if convergences is None:
-        convergences = measured(scene)
-    every = [spec for specs in kinds(scene, convergences).values() for spec in specs]
+def batches_of(scene: Scene) -> list[tuple[TrialSpec, ...]]:
+    """Batches of the scene's trials, of about equal work."""
+    every = list(chain.from_iterable(kinds(scene).values()))
     count = math.ceil(len(every) / batch_size(scene))
     return [tuple(every[i::count]) for i in range(count)]
 
@@ -143,25 +131,19 @@ def write(
     """
     target = Path(folder)
     check_writable(target)
-    convergences = measured(scene)
-    first = {kind: specs[0] for kind, specs in kinds(scene).items()}
-    batches = batches_of(scene, convergences)
     paths = []
     redrawn: Counter[str] = Counter()
     unfelt = 0
-    for run in chain.from_iterable(true_runs(scene, specs) for specs in batches):
+    for run in chain.from_iterable(
+        true_runs(scene, specs) for specs in batches_of(scene)
+    ):
         redrawn.update(run.redrawn)
         for name, trial in recordings(run.physics, run.which):
             saving.save(target / name, trial, lasting=False)
             paths.append(target / name)
             unfelt += trial.frames.max(initial=0) <= scene.skin.onset
             progress(1)
-    rough = {
-        first[kind].key: convergence.error
-        for kind, convergence in convergences.items()
-        if not convergence.within
-    }
-    return Written(sorted(paths), dict(redrawn), int(unfelt), rough)
+    return Written(sorted(paths), dict(redrawn), int(unfelt))
 
 
 def total_trials(scene: Scene) -> int:

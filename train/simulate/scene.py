@@ -31,6 +31,8 @@ CODY_RATE_DEG_S = (20.0, 0.0, 0.0, 0.0, 0.0)
 posture the gains above give the lab arm's 115 N/m at mid-forearm."""
 PLACE_M = 0.103
 """The middle of Cody's 16 rows, rounded to a millimetre."""
+STEPS = 6
+"""Steps of a frame where the scene gives none."""
 CODY_SKIN: dict[str, Any] = dict(read_toml(shipped()).raw["skin"])
 del CODY_SKIN["name"]
 
@@ -90,13 +92,11 @@ def from_dict(table: Mapping[str, Any], where: str = "scene") -> Scene:
     skin, taxel = _skin(top.table("skin", {}))
     spread = _spread(top.table("spread", {}), arm["arm"].dof)
     labels = top.table("labels", {}).fields(schema.LABELS)
-    steps = top.table("step_s", {})
     scene = Scene(
         name=top.text("name", Path(where).stem or "scene"),
         seed=seed,
         trials=per_trial,
-        step_s=_steps(steps, per_trial["rate_hz"]),
-        step_reason=steps.text("reason", "", empty=True),
+        step_s=_steps(top.table("step_s", {}), per_trial["rate_hz"]),
         lead=lead,
         skin=skin,
         taxel_n_m=taxel,
@@ -156,9 +156,9 @@ def _check_spread(scene: Scene, where: str) -> None:
 
 def _steps(table: SceneTable, rate_hz: float) -> dict[str, float]:
     frame = 1.0 / rate_hz
-    if table.raw:
-        table.get("base")  # the step of trials that call for none of the effects named
-    table.has("reason")
+    if not table.raw:
+        return {"base": frame / STEPS}
+    table.get("base")  # the step of trials that call for none of the effects named
     out: dict[str, float] = {}
     for name in filter(table.has, ("base", *EFFECTS)):
         out[name] = table.field(name, schema.STEP)

@@ -137,10 +137,7 @@ class Scene:
     seed: int
     trials: dict[str, float]
     step_s: dict[str, float]
-    """{effect, or `base`: the longest step of its trials}; empty where the step is
-    measured."""
-    step_reason: str
-    """Why the steps are not measured; "" where they are, or where the scene is silent."""
+    """{effect, or `base`: the longest step of its trials}."""
     lead: Value
     arm: Chain
     stiffness: tuple[float, ...]

@@ -48,8 +48,6 @@ TRIALS = {
     "count": Field(1, 1_000_000, 5, integer=True),
     "after_s": Field(0.1, 60.0, 2.2),  # time after it
     "rate_hz": Field(1.0, 10_000.0, 100.0),  # frames a second
-    # error allowed to the step, as a part of the peak force
-    "tolerance": Field(1e-5, 0.5, 0.01),
 }
 LEAD = Field(0.02, 10.0, 0.2)  # time before the skin reaches the object
 TAXEL = above_0(1e15, 10_000.0)  # stiffness of a taxel in N/m

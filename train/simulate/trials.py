@@ -75,7 +75,6 @@ class Batch:
             steps_left=0,
             frame=0,
             h=h,
-            longest_s=np.inf,
         )
         self.arm = self.begin(Arm)
         self.contact = self.begin(Contact)

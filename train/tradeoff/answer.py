@@ -5,8 +5,8 @@ from typing import Any
 from train.report.figures import PANEL, STROKES, curve, legend, picture, spread
 from train.report.score import majority, percent, points, shares
 from train.report.section import Figure, Row, Section, Table
+from train.tradeoff.choices import WINDOWS_S, unseen
 from train.tradeoff.measured import Measurements
-from train.tradeoff.uses import Use, uses
 
 TITLE_S = (0.6, 1.2)
 """Windows with their accuracy in a panel's title."""
@@ -14,22 +14,37 @@ ACROSS = 3
 """At most so many panels stand side by side."""
 
 
+EARLY = (
+    "--leave-out trial",
+    f"--decision-points {WINDOWS_S[0]}:{WINDOWS_S[-1]}:0.1",
+)
+"""Options that export the model whose early decisions were measured."""
+
+
 def answers(measured: Measurements, task: str) -> list[Row]:
     """The rows of a task's table: fixed windows, early decisions, and guessing."""
+    make = measured.commands
     rows: list[Row] = []
-    for use in uses(measured, task):
-        row: Row = {"decision": use.name, "time s": round(use.seconds, 3)}
-        row |= shares(use.result)
-        row["unseen objects %"] = "" if use.unseen is None else percent(use.unseen)
-        row["command"] = commands(use)
+    for window_s, choices in measured.points.items():
+        choice = choices[task]
+        row: Row = {"decision": f"after {window_s:g} s", "time s": window_s}
+        row |= shares(choice.by_trial) | _unseen(unseen(choice))
+        row["command"] = f"`{make.export(f'--window {window_s:g}')}`"
+        rows.append(row)
+    for rule in measured.certified[task]:
+        row = {"decision": f"early, at most {rule.error:.0%} wrong"}
+        row["time s"] = round(rule.mean_s, 3)
+        mean = None if rule.unseen is None else float(rule.unseen.mean())
+        row |= shares(rule.result) | _unseen(mean)
+        row["command"] = f"`{make.export(*EARLY)}`, then `{make.run(rule.error)}`"
         rows.append(row)
     guess = {"decision": "always the most frequent label", "time s": 0.0}
     return [*rows, guess | shares(majority(measured.y[task]))]
 
 
-def commands(use: Use) -> str:
-    """The commands that make a use, one after another."""
-    return ", then ".join(f"`{command}`" for command in use.commands)
+def _unseen(share: float | None) -> Row:
+    """The column of the accuracy on unseen objects."""
+    return {"unseen objects %": "" if share is None else percent(share)}
 
 
 def section(measured: Measurements) -> Section:
@@ -84,9 +99,7 @@ def reasons(measured: Measurements) -> Section:
     notes += [
         *measured.notes,
         f"All accuracies belong to the {kind}, made at windows of "
-        f"{windows} s. Where two neighbours of these do not differ in "
-        f"{next(iter(measured.y))} by more than chance, none between them was measured. "
-        f"To export one of the measured models, use `{commands.front('fast')}`, or "
+        f"{windows} s. To export one of the measured models, use `{commands.front('fast')}`, or "
         "`balanced` (a window of at most 0.9 s) or `accurate` in place of `fast`; `500` is "
         "the most accurate one within 500 ms, and `0.8` the fastest one that reaches "
         "80 %.",

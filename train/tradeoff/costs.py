@@ -1,6 +1,5 @@
 """The accuracy that each saving costs, in one table."""
 
-import time
 from collections import Counter
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
@@ -15,7 +14,6 @@ from edge.features.vector import WINDOW_S
 from edge.touch.layout import SkinLayout
 from train.choose.settings import Chosen
 from train.data.dataset import DataSet, Recordings
-from train.data.folds import finest, stratified_folds
 from train.data.parts import part
 from train.report.score import paired, points
 from train.report.section import Row, Section, Table
@@ -27,11 +25,6 @@ from train.tradeoff.measured import Measurements
 WAITS_S = (0.8, 0.6, 0.4)
 EVERY = (2, 4)
 """Every n-th frame is read, for each n."""
-PARTS = (2, 4)
-"""One n-th of the trials is kept, for each n."""
-FEWEST = 20
-"""Smallest number of trials for a choice."""
-TIME = "time on this machine"
 Hits = Mapping[tuple[Path, int], bool]
 """{(recording, number of its contact): whether the answer is right}."""
 
@@ -42,18 +35,15 @@ class Saving:
 
     Attributes:
         name: the change.
-        price: its saving, or its cost other than accuracy.
+        price: its saving.
         source: the trials, or recordings to follow again.
         options: of the choice.
-        fewer: whether trials are left out on purpose; otherwise a contact that is no
-            longer noticed counts as wrong.
     """
 
     name: str
     price: str
     source: DataSet | Recordings
     options: Mapping[str, Any] = field(default_factory=dict)
-    fewer: bool = False
 
 
 def changes(raw: Recordings, dataset: DataSet, rate_hz: float) -> list[Saving]:
@@ -74,7 +64,6 @@ def changes(raw: Recordings, dataset: DataSet, rate_hz: float) -> list[Saving]:
         taxels = dataset.layout.rows * dataset.layout.cols
         price = f"{4 * taxels} bytes a frame fewer"
         cases.append(Saving("no shear", price, without_shear(dataset)))
-    cases += _fewer_trials(dataset)
     return cases
 
 
@@ -102,18 +91,6 @@ def without_shear(dataset: DataSet) -> DataSet:
     return dataset.of(names)
 
 
-def _fewer_trials(dataset: DataSet) -> Iterator[Saving]:
-    """A part of the trials, as far as it suffices for a choice."""
-    y = {task: dataset.labels(task) for task in dataset.tasks}
-    count = len(dataset.trials)
-    for folds in PARTS:
-        sample = dataset.part(stratified_folds(y[finest(y)], folds) == 0)
-        remaining = len(sample.trials)
-        if remaining >= FEWEST:
-            price = f"{counted(count - remaining, 'recording')} fewer"
-            yield Saving(f"{remaining} of {count} trials", price, sample, fewer=True)
-
-
 def hits(dataset: DataSet, choices: Mapping[str, Chosen]) -> dict[str, Hits]:
     """{task: {(recording, number of its contact): whether the answer is right}}."""
     contacts = []
@@ -128,30 +105,24 @@ def hits(dataset: DataSet, choices: Mapping[str, Chosen]) -> dict[str, Hits]:
     return of_tasks
 
 
-def answered(change: Saving, like: SkinLayout) -> tuple[dict[str, Hits], float]:
-    """{task: hits of the choice made with a change}, and the seconds of one core that
-    it took.
+def answered(change: Saving, like: SkinLayout) -> dict[str, Hits]:
+    """{task: hits of the quick choice made with a change}.
 
     Args:
         change: to measure.
         like: the skin whose thresholds are taken.
     """
-    began = time.process_time()
     dataset = change.source
     if not isinstance(dataset, DataSet):
-        quick = change.options.get("quick", True)
-        dataset = followed(dataset, quick=quick, like=like)
-    result = hits(dataset, chosen(dataset, **change.options))
-    return result, time.process_time() - began
+        dataset = followed(dataset, like=like)
+    return hits(dataset, chosen(dataset, **change.options))
 
 
-def difference(before: Hits, after: Hits, *, fewer: bool) -> tuple[float, float, float]:
+def difference(before: Hits, after: Hits) -> tuple[float, float, float]:
     """The percentage points gained by a change on the same trials, and their 95 %
-    interval."""
-    trials = after if fewer else before
-    were = [before[trial] for trial in trials]
-    are = [after.get(trial, False) for trial in trials]
-    return paired(np.array(were), np.array(are))
+    interval; a contact that is no longer noticed counts as wrong."""
+    are = [after.get(trial, False) for trial in before]
+    return paired(np.array(list(before.values())), np.array(are))
 
 
 def measure(
@@ -160,8 +131,6 @@ def measure(
     windows: Points,
     rate_hz: float,
     workers: Workers,
-    *,
-    quick: bool,
 ) -> list[Row]:
     """A row for each change, beside the choice at `WINDOW_S` on the recordings as they
     are.
@@ -173,46 +142,29 @@ def measure(
             other change with the quick choice.
         rate_hz: frames a second.
         workers: the processes.
-        quick: whether the choices at each window are quick ones; if not, that at
-            `WINDOW_S` is the choice among all candidates.
     """
     full = hits(dataset, windows[WINDOW_S])
     rows = []
     for w in filter(windows.__contains__, WAITS_S):
         wait = Saving(f"waiting {w:g} s", f"{WINDOW_S - w:.1f} s sooner", dataset)
-        rows.append(row_of(wait, full, hits(dataset, windows[w]), 0.0))
-    thorough = Saving(
-        "all candidates", "longer training", raw, options={"quick": False}
-    )
+        rows.append(row_of(wait, full, hits(dataset, windows[w])))
     cases = changes(raw, dataset, rate_hz)
-    if quick:
-        # The longest first: it runs beside the others.
-        cases.insert(0, thorough)
     unchanged = Saving("the quick choice", "", dataset)
     jobs = [(case, dataset.layout) for case in (unchanged, *cases)]
-    (base, _), *afters = workers.map("costs", answered, jobs)
-    if not quick:
-        rows.append(row_of(thorough, base, full, 0.0))
-    for case, (after, seconds) in zip(cases, afters, strict=True):
-        rows.append(row_of(case, base, after, seconds))
-    return rows
+    base, *afters = workers.map("costs", answered, jobs)
+    return rows + [
+        row_of(case, base, after) for case, after in zip(cases, afters, strict=True)
+    ]
 
 
-def row_of(
-    case: Saving,
-    base: Mapping[str, Hits],
-    after: Mapping[str, Hits],
-    seconds: float,
-) -> Row:
-    """The row of a change: the points that it gains, and what it saves or costs."""
-    row: Row = {"change": case.name}
-    for task in base:
-        if task in after:
-            gain = difference(base[task], after[task], fewer=case.fewer)
-            row[f"{task}, points"] = points(gain)
-    row["saves or costs"] = case.price
-    row[TIME] = f"{seconds:.1f} s to train" if seconds else ""
-    return row
+def row_of(case: Saving, base: Mapping[str, Hits], after: Mapping[str, Hits]) -> Row:
+    """The row of a change: the points that it gains, and what it saves."""
+    gains = {
+        f"{task}, points": points(difference(base[task], after[task]))
+        for task in base
+        if task in after
+    }
+    return {"change": case.name, **gains, "saves": case.price}
 
 
 def section(measured: Measurements) -> Section:
@@ -226,12 +178,5 @@ def section(measured: Measurements) -> Section:
             "again with the features that suit the change. A larger taxel reads the sum "
             "of the forces on its area. The last section explains points and intervals.",
         ],
-        [
-            Table(
-                "costs",
-                title,
-                measured.costs,
-                timed=(TIME,),
-            )
-        ],
+        [Table("costs", title, measured.costs)],
     )

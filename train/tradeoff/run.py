@@ -3,7 +3,7 @@ board."""
 
 import json
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -17,7 +17,7 @@ from train.report.section import Section
 from train.report.work import Workers
 from train.tradeoff import answer, costs, early
 from train.tradeoff import board as boards
-from train.tradeoff.choices import WINDOWS_S, choices_at, prepared
+from train.tradeoff.choices import WINDOWS_S, chosen, prepared
 from train.tradeoff.commands import Commands
 from train.tradeoff.front import ParetoFront
 from train.tradeoff.measured import Measurements
@@ -47,29 +47,24 @@ def require_enough(trials: int) -> None:
         )
 
 
-@dataclass(frozen=True, kw_only=True)
-class Options:
-    """What a trade-off is measured with.
-
-    Attributes:
-        task: of front.json; by default `category`, or else the first.
-        quick: make quick choices.
-        jobs: processes.
-    """
-
-    task: str | None = None
-    quick: bool = False
-    jobs: int = 1
-
-
-def tradeoff(data: Sequence[str], out: Path, board_path: str, options: Options) -> Path:
+def tradeoff(
+    data: Sequence[str],
+    out: Path,
+    board_path: str,
+    *,
+    task: str | None = None,
+    quick: bool = False,
+    jobs: int = 1,
+) -> Path:
     """Measure the choice at each window and with each change, and write the report.
 
     Args:
         data: recordings and folders of them.
         out: folder of the report.
         board_path: board.json of a model that was fitted on these recordings.
-        options: see there.
+        task: of front.json; by default `category`, or else the first.
+        quick: make quick choices.
+        jobs: processes.
 
     Returns:
         The path of report.html.
@@ -78,19 +73,20 @@ def tradeoff(data: Sequence[str], out: Path, board_path: str, options: Options) 
         InputError: the data cannot be used, or a file is of another kind or of other
             recordings.
     """
-    workers = Workers(options.jobs)
+    workers = Workers(jobs)
     board = boards.read(board_path)
     raw = read(data, progress=True)
     boards.check(board, board_path, raw.digest)
-    quick = options.quick
-    ready = prepared(raw, quick=quick, jobs=options.jobs)
+    ready = prepared(raw, quick=quick, jobs=jobs)
     dataset = ready.dataset
     require_enough(len(dataset.trials))
-    main = _main_task(dataset, options.task)
-    points = choices_at(dataset, ready.windows, main, workers, quick=quick)
+    main = _main_task(dataset, task)
+    cases = [(dataset, window_s) for window_s in ready.windows]
+    choices = workers.map("windows", partial(chosen, quick=quick), cases)
+    points = dict(zip(ready.windows, choices, strict=True))
     rate = _rate_hz(raw.recordings)
-    certified = early.certified(dataset, WINDOWS_S, quick=quick, jobs=options.jobs)
-    rows = costs.measure(raw, dataset, points, rate, workers, quick=quick)
+    certified = early.certified(dataset, WINDOWS_S, quick=quick, jobs=jobs)
+    rows = costs.measure(raw, dataset, points, rate, workers)
     order = sorted(dataset.tasks, key=lambda task: (task != main, task))
     measured = Measurements(
         y={task: dataset.labels(task) for task in order},

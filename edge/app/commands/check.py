@@ -15,6 +15,7 @@ from edge.app.options import add_file, within
 from edge.app.output import Output
 from edge.errors import counted
 from edge.wire.chips.block import UNCHANGED_FRAMES
+from edge.wire.fake import player
 from edge.wire.skin.calibration import deaf_taxels
 from edge.wire.skin.decoder import NEVER_STUCK, stuck_limits
 from edge.wire.skin.file import SkinFile, load
@@ -129,8 +130,6 @@ def run(arguments: argparse.Namespace) -> int:
     if arguments.skin is None:
         return check_board(output)
     file = load(arguments.skin)
-    from edge.wire.fake import player  # a check of the board needs no chips
-
     rate_hz = player.frame_rate(file, arguments.overhead * 1e-6)
     wrong = list(faults(file))
     remarked = list(remarks(file))

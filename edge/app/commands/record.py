@@ -29,10 +29,11 @@ from edge.app.options import (
 from edge.app.output import LOG
 from edge.app.review import decisions_of
 from edge.app.sinks.event_writer import Lines
+from edge.app.sinks.sink import Event
 from edge.app.source import Opened, reading
 from edge.app.trials import Trials, recording, shared_meta
 from edge.decide.classifier import Classifier
-from edge.decide.events import Decided, Event
+from edge.decide.events import Decided
 from edge.decide.model import Model
 from edge.errors import InputError
 from edge.files import refusing
@@ -40,6 +41,7 @@ from edge.record.labels import Row, read_table
 from edge.record.saving import save
 from edge.touch.arm import Chain
 from edge.touch.frame import Frame
+from edge.wire.fake.player import frame_rate
 from edge.wire.skin import file as skinfile
 from edge.wire.skin.skin import Skin
 from edge.writing import NameTaken, check_writable
@@ -132,8 +134,6 @@ def run(arguments: argparse.Namespace) -> int:
         ) as live,
         closing(live.lines()) as lines,
     ):
-        from edge.wire.fake.player import frame_rate  # counts the bits on a fake bus
-
         wire_s = round(1.0 / frame_rate(live.skin.file), 6)
         recorder = Recorder(
             arguments.out,
@@ -147,9 +147,9 @@ def run(arguments: argparse.Namespace) -> int:
         trials = Trials(live.skin, arguments.length)
         classifier = None if model is None else Classifier(model, live.skin.layout)
         for frame, faults in live.frames():
-            events = [] if classifier is None else classifier.push(frame)
-            lines.write([*faults, *(event.to_dict() for event in events)])
-            live.show(frame, faults, events)
+            events = faults + ([] if classifier is None else classifier.push(frame))
+            for sink in (lines, *live.sinks):
+                sink.push(frame, events)
             recorder.follow(trials, events)
             recorder.save(trials.push(frame), complete=True)
             if recorder.count == arguments.trials:

@@ -6,11 +6,7 @@ tells systemd when it is ready and that it is alive.
 """
 
 import argparse
-import os
-import time
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import ExitStack, closing, contextmanager
-from pathlib import Path
+from contextlib import ExitStack, closing
 from typing import Any
 
 from edge.app.options import (
@@ -22,13 +18,18 @@ from edge.app.options import (
     within,
 )
 from edge.app.output import LOG
-from edge.app.source import Opened, reading
+from edge.app.sinks import keeper, systemd
+from edge.app.sinks.sink import Sink
+from edge.app.source import reading
 from edge.decide.classifier import Classifier
-from edge.decide.events import Event
 from edge.decide.model import Model
-from edge.touch.frame import Frame
+from edge.touch.layout import differences
 from edge.touch.track import MAX_CONTACTS
 from edge.wire.skin.loop import Schedule
+
+SINKS: list[Any] = [keeper, systemd]
+"""Modules with `add_options(parser)` and `open_sink(arguments, opened, model)`, which is
+None where nothing asks for the sink."""
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
@@ -53,18 +54,8 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         help="follow up to this many contacts at once; with more than 1, events have the "
         "contact's number, and decisions its position (default: %(default)s)",
     )
-    parser.add_argument(
-        "--keep",
-        metavar="DIR",
-        type=Path,
-        help="keep touches there as recordings with their decisions, to label and train on",
-    )
-    parser.add_argument(
-        "--keep-if",
-        default="unsure,unknown,unusual",
-        metavar="WHY",
-        help="which touches are kept: unsure, unknown, unusual, all (default: %(default)s)",
-    )
+    for sink in SINKS:
+        sink.add_options(parser)
 
 
 def end_event(schedule: Schedule, frames: int, lost: int) -> dict[str, Any]:
@@ -99,9 +90,6 @@ def run(arguments: argparse.Namespace) -> int:
         real_time=arguments.joints is not None,
     ) as live:
         if live.skin.layout != model.info.layout:
-            # A skin often is the model's.
-            from edge.touch.layout import differences
-
             for sentence in differences(model.info.layout, live.skin.layout):
                 LOG.warning(f"{arguments.model}: {sentence}")
         classifier = Classifier(
@@ -111,46 +99,20 @@ def run(arguments: argparse.Namespace) -> int:
             max_contacts=arguments.contacts,
             motion_on_skin=on_skin,
         )
-        with (
-            closing(live.lines()) as lines,
-            _listeners(arguments, model, live.opened) as listeners,
-        ):
+        with closing(live.lines()) as lines, ExitStack() as stack:
+            sinks: list[Sink] = [lines, *live.sinks]
+            for module in SINKS:
+                sink = module.open_sink(arguments, live.opened, model)
+                if sink is not None:
+                    sinks.append(stack.enter_context(closing(sink)))
             frames = 0
             for frame, faults in live.frames():
                 frames += 1
-                decided = classifier.push(frame)
-                for listen in listeners:
-                    listen(frame, decided)
-                lines.write([*faults, *(event.to_dict() for event in decided)])
-                live.show(frame, faults, decided)
+                events = [*faults, *classifier.push(frame)]
+                for sink in sinks:
+                    sink.push(frame, events)
                 if lines.gone:
                     break
             lines.write(event.to_dict() for event in classifier.finish())
             lines.write([end_event(live.loop.schedule, frames, lines.lost)])
     return 0
-
-
-@contextmanager
-def _listeners(
-    arguments: argparse.Namespace,
-    model: Model,
-    opened: Opened,
-) -> Iterator[list[Callable[[Frame, Sequence[Event]], None]]]:
-    """Functions that take in every frame with its events, where they are called for:
-    one keeps touches, another tells systemd that the program is alive."""
-    listeners: list[Callable[[Frame, Sequence[Event]], None]] = []
-    with ExitStack() as stack:
-        if arguments.keep is not None:
-            from edge.app.sinks.keeper import Keeper, reasons  # few runs keep touches
-
-            why = reasons(arguments.keep_if)
-            keeper = Keeper(arguments.keep, why, opened, model.info)
-            listeners.append(stack.enter_context(closing(keeper)).push)
-        if "NOTIFY_SOCKET" in os.environ:
-            from edge.app.sinks.systemd import Notifier  # only a service has a manager
-
-            notifier = Notifier(now=time.monotonic)
-            notifier.ready(f"reading {opened.source}")
-            stack.callback(notifier.stopping)
-            listeners.append(lambda frame, events: notifier.alive())
-        yield listeners

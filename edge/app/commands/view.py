@@ -201,7 +201,8 @@ def run(arguments: argparse.Namespace) -> int:
         interval_s = 1.0 / RATE_HZ - 0.5 * live.skin.period_s
         for frame, faults in live.frames():
             events = [] if classifier is None else classifier.push(frame)
-            live.show(frame, faults, events)
+            for sink in live.sinks:
+                sink.push(frame, [*faults, *events])
             _follow(events, texts)
             if frame.t >= due:
                 due = frame.t + interval_s

@@ -9,11 +9,13 @@ import os
 import sys
 import threading
 import time
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from queue import SimpleQueue
 from typing import Any, TextIO
 
+from edge.app.sinks.sink import Event
 from edge.decide.events import json_line
+from edge.touch.frame import Frame
 
 MOST_LINES = 10_000
 """Lines that wait for a reader: at two contacts a second, a quarter of an hour."""
@@ -22,7 +24,7 @@ CLOSE_S = 1.0
 PATIENCE_S = 0.05
 """A patient writer asks this often whether to go on waiting."""
 UNREAD = "nobody reads them"
-Event = Mapping[str, Any]
+Line = Mapping[str, Any]
 Patience = Callable[[], bool]
 """Says whether to wait for a slow reader."""
 
@@ -54,7 +56,7 @@ class Lines:
         self,
         out: TextIO | None = None,
         *,
-        form: Callable[[Event], str] = json_line,
+        form: Callable[[Line], str] = json_line,
         patient: Patience = impatient,
     ) -> None:
         """Start the thread.
@@ -77,7 +79,11 @@ class Lines:
         self._thread = threading.Thread(target=self._work, daemon=True)
         self._thread.start()
 
-    def write(self, events: Iterable[Event]) -> None:
+    def push(self, frame: Frame, events: Sequence[Event]) -> None:
+        """Queue the lines of a frame's events."""
+        self.write(event.to_dict() for event in events)
+
+    def write(self, events: Iterable[Line]) -> None:
         """Queue the lines of events in their order; a line that finds the queue full is
         lost once patience has an end."""
         for event in events:

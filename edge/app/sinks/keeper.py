@@ -1,5 +1,6 @@
 """Touches that `run` keeps as recordings, with their decisions, to learn from."""
 
+import argparse
 import queue
 import re
 import threading
@@ -11,10 +12,12 @@ from pathlib import Path
 
 from edge.app.output import LOG
 from edge.app.review import decisions_of, is_unsure
+from edge.app.sinks.sink import Event
 from edge.app.source import Opened
 from edge.app.trials import Trials, recording, shared_meta
-from edge.decide.events import Decided, Event
+from edge.decide.events import Decided
 from edge.decide.info import ModelInfo
+from edge.decide.model import Model
 from edge.errors import EdgeError, InputError, counted
 from edge.record.changes import alone
 from edge.record.labels import read_table
@@ -34,6 +37,32 @@ STEM = "kept-n"
 """Begins a kept file's name, before its number. The numbers, and not a clock that may go
 back, tell which came first; older versions' names, `kept-` with a time, come before."""
 NUMBER = re.compile(rf"{STEM}(\d+)-")
+
+
+def add_options(parser: argparse.ArgumentParser) -> None:
+    """Add the options that ask for a keeper."""
+    parser.add_argument(
+        "--keep",
+        metavar="DIR",
+        type=Path,
+        help="folder in which touches are kept as recordings with their decisions, to "
+        "label and train on",
+    )
+    parser.add_argument(
+        "--keep-if",
+        default="unsure,unknown,unusual",
+        metavar="WHY",
+        help=f"reasons to keep a touch, of {', '.join(REASONS)} (default: %(default)s)",
+    )
+
+
+def open_sink(
+    arguments: argparse.Namespace, opened: Opened, model: Model
+) -> "Keeper | None":
+    """The keeper that the options ask for."""
+    if arguments.keep is None:
+        return None
+    return Keeper(arguments.keep, reasons(arguments.keep_if), opened, model.info)
 
 
 class Keeper:

@@ -7,7 +7,7 @@ import os
 import tempfile
 from collections import Counter, deque
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
 from functools import cache
 from itertools import starmap
 from pathlib import Path
@@ -17,8 +17,10 @@ import numpy as np
 
 from edge.app import review
 from edge.app.review import Touch, changed
+from edge.app.sinks.sink import Event, Fault
 from edge.app.sinks.web import WebServer
-from edge.decide.events import Decided, Event, Onset
+from edge.app.texts import event_text
+from edge.decide.events import Decided, Onset
 from edge.errors import InputError
 from edge.files import parsing
 from edge.record.changes import Change, Former, change, formers, now, undo
@@ -51,6 +53,7 @@ class Page:
         server: serves the page; `server.link` opens it.
         labels: {task: label} of the trials that are recorded next.
         recording: whether contacts are to be saved.
+        schedule: of the loop, whose rate is shown.
     """
 
     def __init__(
@@ -81,6 +84,7 @@ class Page:
             InputError: the address cannot be used, or a trial in the folder cannot be
                 read.
         """
+        self.schedule: Schedule | None = None
         self._folder = folder
         given = dict(labels or {})
         self.labels = {task: label for task, label in given.items() if label}
@@ -111,12 +115,7 @@ class Page:
         }
         self.server = WebServer(address, self._act)
 
-    def push(
-        self,
-        frame: Frame,
-        events: Sequence[Event] = (),
-        schedule: Schedule | None = None,
-    ) -> None:
+    def push(self, frame: Frame, events: Sequence[Event] = ()) -> None:
         """Take in a frame and the events that came with it; now and then, show a
         picture."""
         for event in events:
@@ -124,6 +123,8 @@ class Page:
                 self._decisions = {}
             elif isinstance(event, Decided):
                 self._decisions[event.task] = _decision(event)
+            elif isinstance(event, Fault):
+                self.notice(event_text(event.line).strip())
         if not self.server.watched:
             return
         self._contact = next(iter(self._tracker.push(frame)), self._contact)
@@ -147,10 +148,14 @@ class Page:
         }
         if frame.shear is not None:
             picture["shear"] = frame.shear.reshape(-1, 2).tolist()
-        if schedule is not None:
-            picture["missed"] = schedule.missed_ticks
-            picture["rate_hz"] = round(1.0 / schedule.periods.percentile(50), 1)
+        if self.schedule is not None:
+            picture["missed"] = self.schedule.missed_ticks
+            picture["rate_hz"] = round(1.0 / self.schedule.periods.percentile(50), 1)
         self.server.show(picture)
+
+    def close(self) -> None:
+        """Stop serving."""
+        self.server.close()
 
     def notice(self, text: str) -> None:
         """Show a sentence, such as the state of a chip."""
@@ -378,14 +383,15 @@ def _labels(action: Json) -> dict[str, str]:
 
 
 @contextmanager
-def open_page(address: str, layout: SkinLayout, **options: Any) -> Iterator[Page]:
+def open_page(
+    address: str, layout: SkinLayout, schedule: Schedule, **options: Any
+) -> Iterator[Page]:
     """A page with its link on stderr, closed at the end of the block; see `Page`."""
     page = Page(address, layout, **options)
-    try:
+    page.schedule = schedule
+    with closing(page):
         LOG.info(_way_to(page.server.link))
         yield page
-    finally:
-        page.server.close()
 
 
 def _way_to(link: str) -> str:

@@ -1,12 +1,34 @@
 """Messages to the service manager: ready, alive, stopping (sd_notify(3): a datagram
 each)."""
 
+import argparse
 import os
 import socket
-from collections.abc import Callable, Mapping
+import time
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 
+from edge.app.sinks.sink import Event
+from edge.app.source import Opened
+from edge.decide.model import Model
+from edge.touch.frame import Frame
+
 NEVER = float("inf")
+
+
+def add_options(parser: argparse.ArgumentParser) -> None:
+    """A service manager asks by its environment."""
+
+
+def open_sink(
+    arguments: argparse.Namespace, opened: Opened, model: Model
+) -> "Notifier | None":
+    """A notifier that has said that the service is ready, where a manager listens."""
+    if "NOTIFY_SOCKET" not in os.environ:
+        return None
+    notifier = Notifier(now=time.monotonic)
+    notifier.ready(f"reading {opened.source}")
+    return notifier
 
 
 class Notifier:
@@ -45,14 +67,14 @@ class Notifier:
         """Report that the service is working."""
         self._send("READY=1" + (f"\nSTATUS={status}" if status else ""))
 
-    def alive(self) -> None:
-        """Send a sign of life if one is due; call it in each round of the loop."""
+    def push(self, frame: Frame, events: Sequence[Event]) -> None:
+        """Send a sign of life if one is due."""
         now = self._now()
         if now >= self._due:
             self._due = now + self.period_s
             self._send("WATCHDOG=1")
 
-    def stopping(self) -> None:
+    def close(self) -> None:
         """Report that the service is ending."""
         self._send("STOPPING=1")
 

@@ -8,6 +8,10 @@ from fcntl import LOCK_EX, LOCK_NB, flock, ioctl
 from pathlib import Path
 from typing import Any
 
+import smbus2
+from smbus2 import i2c_msg
+from smbus2.smbus2 import i2c_rdwr_ioctl_data
+
 from edge.wire.bus.protocol import Message, Transfer, bus_error
 
 I2C_TIMEOUT = 0x0702
@@ -88,8 +92,6 @@ class LinuxBus:
             BusError: it does not exist, may not be opened, is in use, or carries no
                 plain I2C.
         """
-        import smbus2
-
         self.close()
         device = find_device(self.name)
         smbus: Any = smbus2.SMBus()
@@ -118,9 +120,6 @@ class LinuxBus:
         Raises:
             BusBusy: a driver of the kernel owns the address.
         """
-        from smbus2 import i2c_msg
-        from smbus2.smbus2 import i2c_rdwr_ioctl_data
-
         address = messages[0].address
         if address not in self._asked and self._fd >= 0:
             try:

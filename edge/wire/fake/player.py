@@ -15,8 +15,10 @@ from edge.errors import InputError
 from edge.interrupt import delayed
 from edge.record.recording import Recording, load
 from edge.touch.layout import SkinLayout
+from edge.wire.bus.serial_bus import serial_bits
 from edge.wire.chips import kinds
 from edge.wire.chips.chip import MOST_TAXELS, UNUSED, ChipSpec
+from edge.wire.chips.three_axes import ZERO, ThreeAxisBlock
 from edge.wire.fake.bus import FakeBus, FakeChip, FakeTCA9548A, Sense, wire_bits
 from edge.wire.fake.clock import TIME_ROUNDING_S, PacedClock, VirtualClock
 from edge.wire.skin import file as skinfile
@@ -111,8 +113,6 @@ def calibrated(file: SkinFile, noise_counts: float = 0.0) -> SkinFile:
             baseline.flat[chip.served] = chip.traits.rest
         calibration = TaxelCalibration(baseline, np.full(baseline.shape, noise_counts))
     if file.layout.axes and calibration.shear_baseline is None:
-        from edge.wire.chips.three_axes import ZERO  # few skins have three axes
-
         shape = *file.layout.shape, 2
         calibration = replace(
             calibration,
@@ -150,10 +150,6 @@ def fake_buses(
     for b, spec in enumerate(file.buses):
         bits = wire_bits
         if spec.serial:
-            from edge.wire.bus.serial_bus import (
-                serial_bits,  # few skins have a serial port
-            )
-
             bits = serial_bits
         bus = make(
             spec.device,
@@ -341,10 +337,6 @@ def skin_file(layout: SkinLayout) -> SkinFile:
         return replace(cody, name="fake", layout=layout)
     kind = kinds.driver("block")
     if layout.axes:
-        from edge.wire.chips.three_axes import (
-            ThreeAxisBlock,  # few skins have three axes
-        )
-
         kind = ThreeAxisBlock
     most = MOST_TAXELS // (layout.axes or 1)
     taxels = range(layout.rows * layout.cols)

@@ -20,6 +20,7 @@ from edge.wire.skin.bus_reader import LONGEST_STEP_S, OLDEST_FRAMES, BusReader, 
 from edge.wire.skin.decoder import Baseline, Decoder
 from edge.wire.skin.file import SkinFile, TaxelCalibration, load
 from edge.wire.skin.lone import LoneTaxels
+from edge.wire.skin.shear import ShearReader
 from edge.wire.skin.wiring import BusSpec
 
 SILENT_FRAMES = 50
@@ -126,12 +127,9 @@ class Skin:
             calibration.noise.ravel(),
             self._decoder.taxels.sign,
         )
-        self.shear = None
+        three = file.layout.axes == 3
+        self.shear = ShearReader(file, self._decoder.rows) if three else None
         """Reads the tangential axes of a skin of three axes; None of others."""
-        if file.layout.axes:
-            from edge.wire.skin.shear import ShearReader  # few skins have three axes
-
-            self.shear = ShearReader(file, self._decoder.rows)
         self._valid = np.zeros(shape, dtype=np.bool_)
         self.invalid_for = np.zeros(shape, dtype=np.int64)
         """(rows, cols) number of frames in a row for which a taxel has had no valid

@@ -9,6 +9,7 @@ from edge.touch.layout import SkinLayout
 from edge.wire.bus import tca9548a
 from edge.wire.chips.chip import MOST_TAXELS, UNUSED, Chip, ChipSpec
 from edge.wire.chips.kinds import KINDS, driver
+from edge.wire.chips.three_axes import three_axes
 
 FASTEST_MUX_HZ = 400_000
 
@@ -97,8 +98,6 @@ def _chip(
     name = _shared(chip, bus, ("kind",)).choice("kind", tuple(KINDS))
     kind = driver(name)
     if layout.axes:
-        from edge.wire.chips.three_axes import three_axes  # few skins have them
-
         kind = three_axes(kind, bus)
     table = _shared(chip, bus, ("kind", "mux", "block", *kind.options))
     table.has("kind")

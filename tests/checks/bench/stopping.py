@@ -25,15 +25,16 @@ from edge.decide.info import StoppingRule
 from edge.features.vector import SAMPLES
 from tests.checks.bench import tables
 from tests.checks.bench.program import start
-from train.data.dataset import read
+from train.choose.options import FitOptions
+from train.data.dataset import Measurement, load_trials, read
 from train.data.feature_sets import expand
 from train.data.folds import finest, stratified_folds
 from train.data.groups import TRIAL
 from train.model.rules import NEVER, THRESHOLDS
 from train.report.work import Workers
 from train.tradeoff.choices import WINDOWS_S as DECISION_POINTS_S
-from train.tradeoff.choices import followed
 from train.tradeoff.early import FOLDS, held_out_decisions
+from train.tune import features_tried
 
 SECONDS = np.array(DECISION_POINTS_S)
 SETS = (
@@ -140,7 +141,10 @@ def our_curves(ours):
 def judge(data, quick, jobs):
     """{task: {fixed window, when sure, or peer: its curves, one for each set of
     features}} of a data set."""
-    dataset = followed(read([data]), NAMES, quick=quick)
+    recordings = read([data])
+    tried = features_tried(recordings, FitOptions(quick=quick))
+    measurement = Measurement(expand([*tried, *NAMES]), DECISION_POINTS_S[-1])
+    dataset = load_trials(recordings, measurement)
     y = {task: dataset.labels(task) for task in dataset.tasks}
     folds = stratified_folds(y[finest(y)], FOLDS)
     by_set = []

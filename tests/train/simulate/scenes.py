@@ -7,9 +7,8 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from train.simulate.convergence import kinds
 from train.simulate.engine import PhysicsRun, readings, run_physics
-from train.simulate.plan import STEP, TUNE, plan_of
+from train.simulate.plan import STEP, TUNE, kinds, plan_of
 from train.simulate.readings import Readings
 from train.simulate.scene import Scene, from_dict
 from train.simulate.scene_model import TrialSpec

@@ -1,27 +1,31 @@
-"""What `--explain` says that effects cost adds up to the run."""
+"""The error that `--explain` gives a scene's steps."""
+
+from dataclasses import replace
 
 from tests.conftest import ROOT
-from train.simulate.convergence import kinds, measure
-from train.simulate.plan import given_steps
+from tests.train.simulate.scenes import make, movable, specs_of
+from train.simulate.account import explain, step_error
+from train.simulate.plan import kinds
 from train.simulate.scene import load
 
-SCENES = ROOT / "train" / "scenes"
+DEMO = ROOT / "train" / "scenes" / "demo.toml"
 
 
-def test_a_scene_says_why_its_steps_are_not_measured(tmp_path):
-    path = tmp_path / "one.toml"
-    path.write_text('[[object]]\nname = "a"\nfamily = "foam"\nconditions = ["fixed"]\n')
-    assert given_steps(load(path)) == ""
-    path.write_text("[step_s]\nbase = 0.005\n" + path.read_text())
-    assert given_steps(load(path)).endswith("base 5 ms; the scene gives no reason")
+def test_the_demos_steps_err_by_as_little_as_its_file_says():
+    scene = load(DEMO)
+    assert max(step_error(scene, specs) for specs in kinds(scene).values()) <= 0.012
+    assert "at most 1.2 %" in DEMO.read_text()
 
 
-def test_the_error_that_the_demo_states_is_that_which_is_measured():
-    scene = load(SCENES / "demo.toml")
-    groups = kinds(scene)
-    worst = 0.0
-    for kind, convergence in measure(scene, groups).items():
-        place = convergence.steps_s.index(groups[kind][0].step_s)
-        worst = max(worst, convergence.errors[place])
-    assert worst <= 0.012
-    assert "at most 1.2 %" in scene.step_reason
+def test_halving_the_step_halves_the_error():
+    scene = make(movable(1.0, 0.4, 0.35, width_m=0.05))
+    errors = [step_error(scene, specs_of(scene, h)) for h in (0.005, 0.0025)]
+    assert 0.0 < errors[1] < 0.7 * errors[0]
+
+
+def test_each_effect_stands_with_what_called_for_it():
+    scene = replace(make(movable(1.0, 0.4, 0.35)), add=("noise",))
+    _, step, *effects = explain(scene).splitlines()
+    assert step.startswith("  step 10 ms errs by ")
+    rows = [line.split() for line in effects]
+    assert rows[1:] == [["sliding", "movable"], ["noise", "effects.add"]]

@@ -9,11 +9,11 @@ from edge.errors import InputError
 from tests.conftest import python
 from tests.train.simulate import scenes
 from tests.train.simulate.scenes import run_batch
-from train.simulate.convergence import kinds
 from train.simulate.engine import values_of
 from train.simulate.plan import (
     INSTEAD,
     STAGES,
+    kinds,
     make_plan,
     module_of,
     required_effects,

@@ -14,8 +14,7 @@ import pytest
 from edge.errors import EdgeError
 from tests.train.simulate.scenes import make, one_object, run, scene, specs_of
 from train.simulate import engine
-from train.simulate.convergence import kinds
-from train.simulate.plan import Call, make_plan
+from train.simulate.plan import Call, kinds, make_plan
 from train.simulate.schema import CONTACT_EFFECTS, EFFECTS
 
 RANGES = {

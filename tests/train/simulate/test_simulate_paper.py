@@ -11,8 +11,9 @@ from scipy.stats import norm
 from train.data.dataset import load_trials
 from train.report.score import grid_search
 from train.simulate import scene as scenes
-from train.simulate.convergence import measure
-from train.simulate.run import kinds, total_trials, write
+from train.simulate.account import step_error
+from train.simulate.plan import kinds
+from train.simulate.run import total_trials, write
 
 SCENE = Path(__file__).parents[3] / "train" / "scenes" / "cody18.toml"
 PAPER = {"category": 80.0, "mobility": 91.43, "object": 72.14}
@@ -75,13 +76,10 @@ def test_headline_accuracies_differ_from_the_papers_by_the_chance_of_both_sample
 
 @pytest.mark.slow
 def test_the_scenes_steps_cost_little_where_nothing_bounces(cody18):
-    # Three kinds stand for all here; --explain measures every one. The arm's inertia is
+    # Three kinds stand for all here; --explain measures each. The arm's inertia is
     # left out: how things bounce is another at each step.
     cody18 = replace(
         cody18, add=tuple(name for name in cody18.add if name != "inertia")
     )
-    sample = dict(list(kinds(cody18).items())[2:10:3])
-    for convergence in measure(cody18, sample).values():
-        # Of the window that labels are judged in; of the longer trials it is a quarter
-        # less.
-        assert convergence.error_as_given < 0.02
+    for specs in list(kinds(cody18).values())[2:10:3]:
+        assert step_error(cody18, specs) < 0.02

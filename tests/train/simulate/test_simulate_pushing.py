@@ -11,10 +11,9 @@ import pytest
 from tests.train.simulate.scenes import make, one_object, run
 from train.simulate import scene as scenes
 from train.simulate.contact import GRAVITY
-from train.simulate.convergence import kinds
 from train.simulate.effects import base, sliding, stribeck, tipping
 from train.simulate.engine import run_physics
-from train.simulate.plan import make_plan
+from train.simulate.plan import kinds, make_plan
 
 CODY18 = Path(scenes.__file__).parents[1] / "scenes" / "cody18.toml"
 

@@ -22,7 +22,6 @@ from train.simulate import scene as scenes
 from train.simulate.run import write
 from train.tradeoff import costs
 from train.tradeoff import run as running
-from train.tradeoff.run import Options
 
 SCENE = ROOT / "train" / "scenes" / "cody18.toml"
 SEED = 4711
@@ -91,8 +90,8 @@ def folders(tmp_path_factory):
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(costs, "changes", lambda *_: [])
         patch.setattr(costs, "measure", lambda *_, **__: [])
-        options = Options(quick=True, jobs=2)
-        report = running.tradeoff([data], folder / "report", str(path), options)
+        out = folder / "report"
+        report = running.tradeoff([data], out, str(path), quick=True, jobs=2)
     return SimpleNamespace(report=report, fresh=folder / "fresh")
 
 

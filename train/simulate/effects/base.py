@@ -27,8 +27,6 @@ FAR_M = -1e9
 """Depth of a contact whose face covers no row."""
 PUSHES_S = 0.2
 """Time for which an arm that may halt pushes on at least."""
-PRESSED_M = 0.002
-"""Depth to which a swinging object is pressed: it swings on the springs met by then."""
 
 
 def swing(t: Trials) -> None:
@@ -153,13 +151,6 @@ def curved_law(t: Trials) -> None:
     gaps = t.bed.line_gap[:, None] + t.bed.gaps
     stiffness = t.bed.weight[:, None] * t.bed.stiffness
     t.set_bed_law(gaps.reshape(-1, len(t)), stiffness.reshape(-1, len(t)))
-
-
-def hang(t: Trials) -> None:
-    """Add up the springs of a light touch."""
-    bed = t.bed
-    pressed = np.where(bed.gaps < PRESSED_M, bed.stiffness, 0.0)
-    bed.swing_k = total(bed.weight) * total(pressed)
 
 
 def tune(t: Trials) -> None:

@@ -10,9 +10,6 @@ import numpy as np
 from train.simulate.contact import GRAVITY
 from train.simulate.trials import Array, Group, Mask, Trials
 
-SWING_PART = 0.2
-"""A step of this part of sqrt(m / k) resolves how a mass m swings on a stiffness k."""
-
 
 class Mover(Group):
     """An object that can move along the push.
@@ -56,11 +53,6 @@ def stand(t: Trials) -> None:
         leans=False,
         lies=np.inf,
     )
-
-
-def resolve(t: Trials) -> None:
-    """Resolve how the object swings on the skin."""
-    t.clock.longest_s = SWING_PART * np.sqrt(t.values["mass_kg"] / t.bed.swing_k)
 
 
 def predict(t: Trials) -> None:

@@ -84,11 +84,6 @@ def law(t: Trials) -> None:
     stems.order = t.set_bed_law(stems.depth, stems.stiffness)
 
 
-def hang(t: Trials) -> None:
-    """Add up the stems."""
-    t.bed.swing_k = total(t.states["stems"].stiffness)
-
-
 def tune(t: Trials) -> None:
     """The law of the next step: the stems still held, and implicitly the damping of
     bent ones."""

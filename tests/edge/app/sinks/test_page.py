@@ -9,6 +9,7 @@ import pytest
 
 import edge
 from edge import demo
+from edge.app.sinks.sink import Fault
 from edge.decide.events import Decided, Onset
 from edge.errors import InputError
 from edge.record.labels import TABLE
@@ -86,6 +87,12 @@ def test_a_decision_comes_with_the_nearest_training_trials_and_their_distances(
     names, distances = zip(*pictures[-1]["decisions"][0]["neighbours"], strict=True)
     assert names == decided.nearest
     assert distances == tuple(decided.decision.distances.round(3).tolist())
+
+
+def test_a_fault_is_a_notice(page, pictures):
+    lost = {"event": "bus", "t": 3.0, "bus": "/dev/i2c-1", "state": "back"}
+    page.push(next(frames()), [Fault(lost)])
+    assert pictures[-1]["notices"] == ["3.000 s  /dev/i2c-1 is back"]
 
 
 SEEN = {"labels": {}, "left_out": False}

@@ -43,7 +43,7 @@ def test_a_sign_of_life_goes_out_twice_in_the_time_allowed_however_often_it_is_g
     service = notifier(WATCHDOG_USEC="10000000", WATCHDOG_PID=str(os.getpid()))
     for tick in range(2001):  # 20 s at 100 Hz
         clock.sleep_until(100.0 + tick / 100)
-        service.alive()
+        service.push(None, [])
     assert messages(manager) == ["WATCHDOG=1"] * 5
 
 
@@ -65,9 +65,9 @@ def test_a_name_in_the_abstract_namespace(clock):
 )
 def test_nobody_watches(manager, clock, notifier, environment):
     service = notifier(**environment)
-    service.alive()
+    service.push(None, [])
     clock.sleep_until(1100.0)
-    service.alive()
+    service.push(None, [])
     assert messages(manager) == []
 
 
@@ -77,13 +77,13 @@ def test_without_a_manager_no_socket_is_opened(notifier, address, monkeypatch):
     opened = []
     monkeypatch.setattr(socket, "socket", lambda *kind: opened.append(kind))
     service.ready()
-    service.alive()
-    service.stopping()
+    service.push(None, [])
+    service.close()
     assert opened == []
 
 
 def test_a_manager_that_does_not_listen_does_not_hold_up_the_loop(manager, notifier):
     service = notifier()
     for _ in range(10_000):  # far more than a socket's queue takes
-        service.stopping()
+        service.close()
     assert 1 <= len(messages(manager)) < 10_000

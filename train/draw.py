@@ -1,5 +1,5 @@
-"""Draw touches side by side: the loaded skin, the three features, the decision and its
-time."""
+"""Draw touches, a column each: the loaded skin, the three features, the decision and
+its time."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -25,10 +25,10 @@ from edge.touch.track import ContactTracker
 from edge.writing import write_whole
 from train.data.arms import arm_of
 from train.data.contacts import contacts
-from train.draw.recording import PLAIN_TEXT, UNITS, curves, units
 
 MOST = 6
 """More columns would not be readable at the width of a page."""
+UNITS = {"newton": "N", "metre": "m", "taxel": "taxels", "count": "counts"}
 TITLES = "largest force", "area", "moved"
 GAMMA = 0.4
 """Exponent of the colour scale, so that soft touches are seen beside hard ones."""
@@ -63,7 +63,7 @@ def draw(
             f"{len(recordings)} recordings are too many side by side; give {MOST}"
         )
     inks: dict[str, Any] = {
-        **PLAIN_TEXT,
+        "text.parse_math": False,  # a label with two dollar signs is no formula
         "font.size": 12,
         "axes.prop_cycle": cycler(color=INKS[dark]),
     }
@@ -100,14 +100,18 @@ def _draw(
         _draw_curves(column[1:], touch.series, decided, horizon)
         if decided is not None:
             _draw_answer(column[3], decided)
-    named = zip(axes[1:, 0], TITLES, units(layout).values(), strict=True)
-    for axis, title, unit in named:
+    for axis, title, unit in zip(axes[1:, 0], TITLES, units(layout), strict=True):
         axis.set(ylim=(0.0, None), ylabel=f"{title} ({unit})")
     axes[0, 0].set_ylabel("row, elbow to wrist" if layout.wraps else "row")
     bar = figure.colorbar(image, ax=axes[0, :], pad=0.01, shrink=0.9)
     bar.set_label(f"{UNITS[layout.force_unit]} per taxel")
     with write_whole(out) as file:
         figure.savefig(file, format="png", dpi=100, bbox_inches="tight")
+
+
+def units(layout: SkinLayout) -> tuple[str, str, str]:
+    """The units of the paper's three features, as on an axis."""
+    return UNITS[layout.force_unit], UNITS["taxel"], UNITS[layout.length_unit]
 
 
 def contact_of(
@@ -177,13 +181,13 @@ def _require_units(touch: _Column, layout: SkinLayout) -> None:
     Raises:
         InputError: the sentence names the touch.
     """
-    theirs = units(touch.recording.layout)
-    for feature, unit in units(layout).items():
-        if theirs[feature] != unit:
-            raise InputError(
-                f"{touch.name}: {feature} is in {theirs[feature]}, that of the first "
-                f"recording in {unit}; draw recordings of one skin"
-            )
+    theirs = ", ".join(units(touch.recording.layout))
+    ours = ", ".join(units(layout))
+    if theirs != ours:
+        raise InputError(
+            f"{touch.name}: its features are in {theirs}, those of the first recording "
+            f"in {ours}; draw recordings of one skin"
+        )
 
 
 def _decided(touch: _Column, model: Model) -> Decided | None:
@@ -204,7 +208,9 @@ def _draw_curves(
 ) -> None:
     """A touch's curves below each other, and until when they count."""
     end = horizon if decided is None else decided.window_s
-    for axis, curve in zip(axes, curves(series).values(), strict=True):
+    scale = series.layout.counts_per_newton or 1.0
+    curves = (series.peak / scale, series.area, series.motion)
+    for axis, curve in zip(axes, curves, strict=True):
         axis.plot(series.t, curve, color="C0", linewidth=2.2)
         axis.axvspan(0.0, end, color="C0", alpha=0.08, linewidth=0)
         if decided is not None:
