@@ -393,7 +393,7 @@ class Source:
             "slopes": far.slopes,
         }
         self.values |= {key: limit[-self._last :] for key, limit in limits.items()}
-        self.values |= {"naming": naming, "calibrated": info.novelty is not None}
+        self.values |= {"naming": naming, "has_novelty": info.novelty is not None}
 
 
 def write_rooms(rooms: Path, folder: Path, values: Mapping[str, str]) -> None:

@@ -3,7 +3,7 @@ candidates."""
 
 import re
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -42,24 +42,16 @@ class Answers:
     """A task's answers to held-out trials.
 
     Attributes:
-        classes: the task's labels, sorted.
         truth: (n,) labels; empty where a trial has none, or was never held out.
         answers: (n,) the answers of fits to the other trials.
-        nearest: (n,) the nearest of the other trials.
-        distances: (n, 2) to that one, and to the nearest with the right label.
+        nearest: (n,) the trial nearest to each in such a fit.
+        distances: (n,) to it.
     """
 
-    classes: list[str]
     truth: Strings
     answers: Strings
     nearest: Integers
     distances: Floats
-
-    @property
-    def wrong(self) -> list[int]:
-        """The trials with a wrong answer."""
-        wrong: list[int] = np.flatnonzero(self.answers != self.truth).tolist()
-        return wrong
 
 
 @dataclass(frozen=True)
@@ -72,19 +64,6 @@ class Exported:
     prices: Prices
 
 
-@dataclass(frozen=True)
-class Shared:
-    """What tasks with the same settings share.
-
-    Attributes:
-        slopes: of the settings, by all trials.
-        fits: {numbers of training trials: fits on them}.
-    """
-
-    slopes: Slopes
-    fits: dict[bytes, Fits] = field(default_factory=dict)
-
-
 def _without_fold(
     vectors: Vectors,
     choices: Choices,
@@ -92,9 +71,10 @@ def _without_fold(
 ) -> dict[str, tuple[Strings, Integers, Floats]]:
     """{task: the results of `_held_out`} of tasks with the same settings, which share
     their fits, from {task: its held-out trials}."""
-    shared = Shared(slopes_of([choices], vectors))
+    slopes = slopes_of([choices], vectors)
+    fits: dict[bytes, Fits] = {}
     return {
-        task: _held_out(vectors, task, choices, test, shared)
+        task: _held_out(vectors, task, choices, test, slopes, fits)
         for task, test in tests.items()
     }
 
@@ -104,35 +84,32 @@ def _held_out(
     task: str,
     choices: Choices,
     test: Integers,
-    shared: Shared,
+    slopes: Slopes,
+    fits: dict[bytes, Fits],
 ) -> tuple[Strings, Integers, Floats]:
-    """(test,) answers to held-out trials, with the nearest trials and the distances
-    that `Answers` has.
+    """(test,) answers to held-out trials, the trials nearest to them, and their
+    distances.
 
     Args:
         vectors: (n, p) of all trials.
         task: the task to answer.
         choices: each task's settings, chosen without the held-out trials.
         test: the held-out trials.
-        shared: whose fits are taken, and added to.
+        slopes: of the settings, by all trials.
+        fits: {numbers of training trials: fits on them}, taken and added to.
     """
-    labels = vectors.y[task]
-    counting = labels != ""
+    counting = vectors.y[task] != ""
     counting[test] = False
     training = np.flatnonzero(counting)
     X = vectors.X[test]
     fewer = vectors.part(training)
     possible = fittable(choices, fewer.y)
-    fits = shared.fits.setdefault(training.tobytes(), {})
-    model = ContactClassifier.of(possible, fewer, fits, shared.slopes)
+    of_training = fits.setdefault(training.tobytes(), {})
+    model = ContactClassifier.of(possible, fewer, of_training, slopes)
     fitted = model.tasks_[task]
+    distances, neighbours = fitted.neighbours(X)
     answers = fitted.classes[model.decide(X)[task].labels]
-    squares = fitted.squares(X)
-    right = fitted.classes[fitted.labels] == labels[test][:, None]
-    to_right = np.where(right, squares, np.inf).min(axis=1)
-    distances = np.sqrt(np.stack([squares.min(axis=1), to_right], axis=1))
-    nearest = fitted.space.members[squares.argmin(axis=1)]
-    return answers, training[nearest], distances
+    return answers, training[neighbours[:, 0]], distances[:, 0]
 
 
 def answers_of(fitted: Fitted, jobs: int = 1) -> dict[str, Answers]:
@@ -149,10 +126,8 @@ def answers_of(fitted: Fitted, jobs: int = 1) -> dict[str, Answers]:
         labels = vectors.y[task]
         tested = (chosen.folds >= 0) & (labels != "")
         truth = np.where(tested, labels, "")
-        classes = np.unique(labels).tolist()
-        nearest = np.zeros(len(truth), np.int64)
-        distances = np.zeros((len(truth), 2))
-        answers[task] = Answers(classes, truth, truth.copy(), nearest, distances)
+        nearest = np.zeros(len(labels), dtype=np.int64)
+        answers[task] = Answers(truth, truth.copy(), nearest, np.zeros(len(labels)))
         for fold, by_task in enumerate(chosen.by_fold):
             test = np.flatnonzero(tested & (chosen.folds == fold))
             if test.size:
@@ -262,8 +237,7 @@ def _wrong(exported: Exported) -> Section:
     rows = []
     trials = names(exported.fitted.measured)[1]
     for task, answer in exported.answers.items():
-        for trial in answer.wrong:
-            nearest, to_label = answer.distances[trial].tolist()
+        for trial in np.flatnonzero(answer.answers != answer.truth):
             rows.append(
                 {
                     "trial": trials[trial],
@@ -271,8 +245,7 @@ def _wrong(exported: Exported) -> Section:
                     "label": answer.truth[trial],
                     "answer": answer.answers[trial],
                     "nearest trial": trials[answer.nearest[trial]],
-                    "distance": nearest,
-                    "distance to its label": to_label,
+                    "distance": answer.distances[trial],
                 }
             )
     text = [
@@ -285,15 +258,14 @@ def _wrong(exported: Exported) -> Section:
 
 
 def _features(exported: Exported) -> Section:
-    """The features with their units."""
-    fitted = exported.fitted
-    dataset = fitted.dataset
-    widths = dataset.widths(fitted.samples)
+    """The features of the model."""
+    dataset = exported.fitted.dataset
+    widths = dataset.widths(exported.fitted.samples)
     rows: list[Row] = [
         {"feature": name, "unit": "" if unit == "1" else unit, "values": width}
         for (name, unit), width in zip(dataset.units.items(), widths, strict=True)
     ]
-    return Section("Features", [], [Table("features", "Features", rows)])
+    return Section("Features", tables=[Table("features", "Features", rows)])
 
 
 def _sizes(exported: Exported) -> Section:

@@ -191,6 +191,8 @@ def test_every_output_has_the_bits_of_whole_numbers(tmp_path, seed):
 @pytest.mark.parametrize("seed", range(5, 25))
 def test_so_it_has_in_c(tmp_path, seed):
     model, vectors = assert_bits(tmp_path, seed)
+    if not all(task.components for task in model.info.tasks.values()):
+        pytest.skip("C divides no squares that have no summands")
     assert_same(model, tmp_path / "c", [], vectors)
 
 
