@@ -234,7 +234,9 @@ def calibrate(
 def uncalibrated(vectors: Vectors, settings: Settings) -> ContactClassifier:
     """A classifier for the full window alone."""
     if settings.prototypes:
-        of_trials = divided(vectors, settings.choices, settings.prototypes, {})
+        at_end = replace(vectors, X=vectors.X[None])
+        choices = [settings.choices]
+        of_trials = divided(at_end, slice(None), choices, settings.prototypes, [{}])
         vectors = replace(vectors, prototypes=of_trials)
     return ContactClassifier.of(settings.choices, vectors)
 
