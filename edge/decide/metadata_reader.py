@@ -99,6 +99,7 @@ def _read(meta: ConfigTable) -> ModelInfo:
         usual=_usual(meta, names),
         still_s=meta.numbers("still_s", default=()),
         repeats=meta.flag("repeats", False),
+        scorer=meta.text("scorer", "knn"),
         onset=meta.choice("onset", ("", *ONSETS), ""),
         speeds=meta.numbers("speeds", 2) if meta.has("speeds") else (),
     )
@@ -114,7 +115,7 @@ def _task(table: ConfigTable) -> Task:
     factors = table.table("factors")
     task = Task(
         labels,
-        k=table.whole("k", allowed=range(1, 1 << 31)),
+        k=table.whole("k", allowed=range(1 << 31)),
         components=table.whole("components", allowed=range(1 << 31)),
         scaling=table.text("scaling"),
         accuracy=table.number("accuracy", low=0.0, high=1.0),
