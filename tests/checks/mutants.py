@@ -61,11 +61,8 @@ class Room(NamedTuple):
 
 
 ROOMS = {
-    "skin": Room(
-        "edge/wire/skin/*.py",
-        "tests/edge/wire/skin tests/edge/wire/chips tests/edge/wire/bus",
-    ),
-    "bus": Room("edge/wire/bus/*.py", "tests/edge/wire/bus tests/edge/wire/skin"),
+    "skin": Room("edge/wire/skin/*.py", "tests/edge/wire/skin"),
+    "bus": Room("edge/wire/bus/*.py", "tests/edge/wire/bus"),
     "labels": Room(
         "edge/record/labels.py",
         "tests/edge/record/test_labels.py tests/edge/app/commands/test_label.py",
