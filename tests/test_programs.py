@@ -1,6 +1,9 @@
 """Measuring programs refuse options that would measure nothing, before they begin; and
 a table names the command that made it."""
 
+import signal
+import subprocess
+import sys
 from types import SimpleNamespace
 
 import pytest
@@ -14,6 +17,7 @@ from tests.checks.bench.scale import rows_of
 from tests.checks.hard_cases import __main__ as hard_cases
 from tests.checks.hard_cases import elsewhere
 from tests.checks.other_skins import SKINS, touch
+from tests.conftest import ROOT
 
 
 @pytest.mark.parametrize(
@@ -92,6 +96,25 @@ def test_other_skins_have_their_traits():
     assert touch(glove, 3, 1).frames[0].max() > 60
     loads = touch(force_glove, 3, 0).frames[60:].sum(axis=(1, 2))
     assert loads.max() > 10 * loads.min()
+
+
+STEP = """
+from tests.checks import __main__ as checks
+words = ("import time; print(1, flush=True); time.sleep(600)",)
+checks.CHECKS = {"x": checks.Program((checks.PYTHON, "-c", *words), "")}
+checks.main(["x"])
+"""
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="needs Linux")
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT, signal.SIGKILL])
+def test_no_step_outlives_its_check(number):
+    pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.DEVNULL, "cwd": ROOT}
+    with subprocess.Popen([sys.executable, "-c", STEP], **pipes) as program:
+        assert program.stdout.readline() == b"1\n"
+        program.send_signal(number)
+        # All that could write have ended.
+        assert program.communicate(timeout=60) == (b"", None)
 
 
 def test_options_of_a_check_reach_its_last_step_and_a_failed_step_ends_it(monkeypatch):

@@ -20,6 +20,7 @@ from typing import NamedTuple
 import pytest
 
 from edge.errors import EdgeError
+from tests.checks.__main__ import end_with_parent
 from tests.checks.bench import tables
 from tests.checks.bench.program import start
 from tests.conftest import ROOT
@@ -125,6 +126,7 @@ def drawn(room, count, seed):
 
 def tested(folder, words):
     """End this process with the status of pytest in a copy of the checkout."""
+    end_with_parent()
     os.chdir(folder)
     os.environ["PYTHONPATH"] = str(folder)
     for number in (1, 2):
