@@ -21,17 +21,16 @@ from tests.conftest import ROOT
 
 
 @pytest.mark.parametrize(
-    ("main", "words", "sentence"),
+    ("measure", "words", "sentence"),
     [
-        (hard_cases.main, ["--only", "tyes"], "no case's name holds 'tyes'"),
-        (elsewhere.main, ["--golden", "none", "python"], "no golden files are in none"),
+        (hard_cases.measure, ["tyes"], "no case's name holds 'tyes'"),
+        (elsewhere.measure, ["none", "python"], "no golden files are in none"),
+        (mutants.measure, [1, 1, "train"], "the rooms are skin, bus, "),
     ],
 )
-def test_options_that_would_measure_nothing_are_refused(main, words, sentence, capsys):
-    with pytest.raises(SystemExit) as ended:
-        main(words)
-    assert ended.value.code == 2
-    assert sentence in capsys.readouterr().err
+def test_options_that_would_measure_nothing_are_refused(measure, words, sentence):
+    with pytest.raises(EdgeError, match=sentence):
+        measure(*words)
 
 
 def test_a_number_of_nothing_is_refused(monkeypatch, capsys):
@@ -67,11 +66,6 @@ def test_a_word_is_exchanged_where_it_is_code(monkeypatch, tmp_path):
         'return a < 1e+6 and "<"',
         'return a < 1e-6 or "<"',
     ]
-
-
-def test_a_room_that_is_not_there_is_refused():
-    with pytest.raises(EdgeError, match="the rooms are skin, bus, "):
-        mutants.measure(1, 1, "train")
 
 
 def test_a_table_has_its_command_as_it_can_be_run_and_no_empty_part(

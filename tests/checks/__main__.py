@@ -78,7 +78,13 @@ def hard_cases(out, data):
         steps += [
             module("venv", folder),
             (python, "-m", "pip", "install", "--quiet", *packages),
-            module("tests.checks.hard_cases.elsewhere", "--golden", golden, python),
+            module(
+                "tests.checks.hard_cases.elsewhere",
+                "--golden",
+                golden,
+                "--python",
+                python,
+            ),
         ]
     return [*steps, module("tests.checks.hard_cases")]
 
