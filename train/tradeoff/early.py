@@ -75,14 +75,14 @@ def certified(
     model = fit(dataset, **options, jobs=jobs).sequential
     assert model is not None
     folds = stratified_folds(y[finest(y)], FOLDS)
-    known = held_out_decisions(dataset, folds, options, jobs)
+    of_trials = held_out_decisions(dataset, folds, options, jobs)
     unseen: dict[str, TimeSeries] = {}
     groups = groups_of(dataset, y, LEAVE_OUT, quick=True)
     if groups is not None:
         by_task = held_out_decisions(dataset, groups.folds, options, jobs)
         unseen = {task: by_task[task] for task in groups.tasks}
     return {
-        task: at_errors(stopping, known[task], unseen.get(task))
+        task: at_errors(stopping, of_trials[task], unseen.get(task))
         for task, stopping in model.stopping_.items()
     }
 
