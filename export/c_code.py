@@ -162,7 +162,7 @@ class Source:
         self.ram = 0
         self.work: dict[str, float] = dict.fromkeys(COSTS, 0.0)
         self.work["task"] += len(model.info.tasks)
-        outputs = set(model.outputs) - set(() if doubts else DOUBTS)
+        outputs = set(model.info.outputs) - set(() if doubts else DOUBTS)
         points = range(len(windows_s))[-self._last :]
         room = self._info.width + self._features()
         graph = CompiledGraph(model, outputs, points, room)
@@ -393,7 +393,7 @@ class Source:
             "slopes": far.slopes,
         }
         self.values |= {key: limit[-self._last :] for key, limit in limits.items()}
-        self.values |= {"naming": naming, "calibrated": info.novelty is not None}
+        self.values |= {"naming": naming, "has_novelty": info.novelty is not None}
 
 
 def write_rooms(rooms: Path, folder: Path, values: Mapping[str, str]) -> None:

@@ -8,9 +8,11 @@ from math import prod
 from typing import NamedTuple
 
 import numpy as np
+import onnx
+import onnxruntime
+from onnx.helper import make_empty_tensor_value_info
 
 from edge.arrays import Array, Floats, Integers
-from edge.decide.graph import Graph
 from edge.decide.model import Model
 from edge.decide.onnx_file import Node
 from edge.errors import InputError
@@ -105,21 +107,27 @@ class CompiledGraph:
         self._numbers: dict[tuple[str, tuple[int, ...], bytes], int] = {}
         self._of_means: dict[str, Array] = {}
         """{name of means: which features they are of}."""
-        graph = Graph(model.contents)
-        self._values = []
+        proto = onnx.load_from_string(model.contents.data)
+        self._makers = {
+            name: node for node in model.contents.nodes for name in node.outputs
+        }
+        del proto.graph.output[:]
+        proto.graph.output.extend(map(make_empty_tensor_value_info, self._makers))
+        options = onnxruntime.SessionOptions()
+        options.log_severity_level = 4
+        session = onnxruntime.InferenceSession(proto.SerializeToString(), options)
+        self._values: list[dict[str, Array]] = []
         for point in points:
-            inputs = {
-                "features": np.zeros((1, self._width)),
-                "decision_point": np.array([point]),
-            }
-            values = graph.run(list(graph.makers), inputs)
-            results = dict(zip(graph.makers, values, strict=True))
-            self._values.append(graph.constants | inputs | results)
+            inputs = {"features": np.zeros((1, self._width))}
+            if model.info.decision_points_s:
+                inputs["decision_point"] = np.array([point])
+            values = session.run(None, inputs)
+            results = dict(zip(self._makers, values, strict=True))
+            self._values.append(model.contents.constants | inputs | results)
         self._variable = {"features"}
         for node in model.contents.nodes:
             if not self._variable.isdisjoint(node.inputs):
                 self._variable.update(node.outputs)
-        self._makers = graph.makers
         nodes = self._needed(model.contents.nodes, outputs)
         nodes = self._needed([*self._fused(nodes), *nodes], outputs)
         self._place(nodes, outputs)

@@ -32,7 +32,7 @@ from train.model.novelty import (
     NoveltyPoint,
     NoveltySpace,
 )
-from train.model.pipeline import ContactClassifier, FittedSpace, nearest_of_label
+from train.model.pipeline import ContactClassifier, FittedSpace
 from train.model.stopping import SequentialClassifier
 
 IR_VERSION = 8
@@ -205,16 +205,16 @@ def _task(
             coordinates' unit.
         has_label_distances: whether something goes by them.
     """
-    trials = points[-1].n_trials_
+    count = points[-1].n_rows_
     at_points = [point.tasks_[task] for point in points]
     last = at_points[-1]
     members = last.space.members
     rows = []
     for fitted in at_points:
-        of_all = np.zeros((trials, fitted.space.rows.shape[1]))
+        of_all = np.zeros((count, fitted.space.rows.shape[1]))
         of_all[members] = fitted.space.rows / fitted.unit
         rows.append(of_all)
-    labels = np.full(trials, -1)
+    labels = np.full(count, -1)
     labels[members] = last.labels
     components = [point.choices[task].components for point in points]
     z, off, unit = projected
@@ -227,7 +227,7 @@ def _task(
     _vote(build, task, labels, len(last.classes), neighbours, last.k, off)
     if has_label_distances:
         scales = [fitted.unit * fitted.slope for fitted in at_points]
-        _label_distances(build, task, squares, labels, scales)
+        _label_distances(build, task, squares, labels, last.counts, scales)
 
 
 def _doubt(build: Builder, space: NoveltySpace) -> None:
@@ -297,6 +297,7 @@ def _label_distances(
     task: str,
     squares: str,
     labels: Integers,
+    counts: Integers,
     scales: Sequence[float],
 ) -> None:
     """Nodes for `train.model.pipeline.label_distances` (n, labels).
@@ -304,13 +305,13 @@ def _label_distances(
     Args:
         build: takes the nodes.
         task: its name.
-        squares: name of the squared distances (n, rows) to trials.
-        labels: (rows,) of the trials; -1 where one has none.
+        squares: name of the squared distances (n, rows).
+        labels: (rows,) of the rows; -1 where one has none.
+        counts: (labels,) rows that stand for each.
         scales: of the distances at each decision point.
     """
     sizes = np.bincount(labels[labels >= 0])
-    counts = nearest_of_label(sizes)
-    # The trials of each label, filled up with a row that is infinitely far.
+    # The rows of each label, filled up with a row that is infinitely far.
     members = np.full((len(sizes), int(sizes.max())), len(labels))
     for label, size in enumerate(sizes):
         members[label, :size] = np.flatnonzero(labels == label)

@@ -24,9 +24,8 @@ struct Stream {
   void beginTransmission(uint8_t address);
   uint8_t endTransmission(bool stop = true);
   size_t requestFrom(uint8_t address, size_t size);
-  size_t print(const char*);
   size_t println(const char*);
-  size_t print(double, int digits);
+  size_t println(int);
   int available();
   int read();
   size_t write(uint8_t);

@@ -46,12 +46,28 @@ def test_what_grows_faster_than_its_bound_is_told():
     assert not rows_of([few, {**many, "memory, MB": 1601.0}])[1]
 
 
-def test_mutants_without_a_name_are_refused(monkeypatch):
-    """mutmut would try all of them."""
-    monkeypatch.setattr(mutants, "generate", lambda: None)
-    monkeypatch.setattr(mutants, "statuses", lambda: {"edge.x": "not checked"})
-    with pytest.raises(EdgeError, match="no mutant's name contains 'train'"):
-        mutants.measure(200, 15.0, "train")
+def test_a_word_is_exchanged_where_it_is_code(monkeypatch, tmp_path):
+    code = (
+        'def f(a):  # < is "not" code\n    """1 < 2"""\n    return a < 1e-6 and "<"\n'
+    )
+    (tmp_path / "a.py").write_text(code)
+    (tmp_path / "a.c").write_text("#if 1\nint a = i++ < 0; /* not < 9 */ // 9\n")
+    monkeypatch.setattr(mutants, "ROOT", tmp_path)
+    lines = [change.changed().splitlines() for change in mutants.changes("a.*")]
+    assert [line[1] for line in lines[:2]] == [
+        "int a = i++ <= 0; /* not < 9 */ // 9",
+        "int a = i++ < 1; /* not < 9 */ // 9",
+    ]
+    assert [line[2].strip() for line in lines[2:]] == [
+        'return a <= 1e-6 and "<"',
+        'return a < 1e+6 and "<"',
+        'return a < 1e-6 or "<"',
+    ]
+
+
+def test_a_room_that_is_not_there_is_refused():
+    with pytest.raises(EdgeError, match="the rooms are skin, bus, "):
+        mutants.measure(1, 1, "train")
 
 
 def test_a_table_has_its_command_as_it_can_be_run_and_no_empty_part(

@@ -12,7 +12,7 @@ OPTIONAL = (
     "edge/wire/bus/serial_bus.py",
     "edge/wire/chips/mpr121.py",
     "edge/decide/early.py",
-    "edge/decide/graph.py",
+    "edge/decide/knn.py",
     "edge/app/sinks/web.py",
 )
 """Modules that neither this skin, nor the demo's model, nor an option calls for."""

@@ -10,6 +10,7 @@ from edge.features.vector import WINDOW_S
 from edge.record.slips import slips, too_few
 from train.choose.decision_points import decision_points, has_early_points
 from train.choose.options import FitOptions, described
+from train.choose.rows import fewest
 from train.choose.settings import Settings
 from train.data.broken import BrokenTaxels
 from train.data.dataset import DataSet, read
@@ -17,9 +18,10 @@ from train.data.folds import representative
 from train.data.groups import TRIAL, are_drawn
 from train.data.leaks import leaks, without_copies
 from train.data.tasks import labels_of_tasks, lacking
-from train.data.vectors import Labels
+from train.data.vectors import Labels, Vectors
 from train.fitted import Fitted
 from train.model.pipeline import ContactClassifier
+from train.model.prototypes import counts_tried
 from train.model.stopping import SequentialClassifier
 from train.notes import warnings
 from train.tune import Loaded, choosing_of, trials_of, window, windows_of
@@ -68,6 +70,7 @@ def fit(data: DataSet | str | Path | Sequence[str | Path], **options: Any) -> Fi
     untouched = loaded.dataset.untouched[:: len(labels) // len(taught)]
     sample = replace(loaded.dataset.part(taught), untouched=untouched)
     settings, of_window = choose(replace(loaded, dataset=sample), few, fixed)
+    settings = in_prototypes(settings, sample, y, fixed)
     settings = settings.with_others(taught, y)
     measured = loaded.dataset.with_kernels(settings.window_s)
     points, of_points = decision_points(measured, settings, fixed)
@@ -151,6 +154,31 @@ def choose(
     return settings, notes
 
 
+def in_prototypes(
+    settings: Settings, sample: DataSet, y: Labels, options: FitOptions
+) -> Settings:
+    """The settings, with prototypes where a model of all trials would be large.
+
+    Args:
+        settings: chosen by a sample.
+        sample: measured for every candidate.
+        y: {task: (n,) labels} of all trials.
+        options: of the fit.
+    """
+    counts = counts_tried(y)
+    if not counts:
+        return settings
+    window_s = settings.window_s
+    dataset = sample.with_kernels(window_s).of(sorted(settings.features()))
+    points = 0.5 * window_s, window_s
+    X = dataset.at_points(points, options.samples)
+    few = {task: dataset.labels(task) for task in y}
+    vectors = Vectors(X, few, dataset.names, dataset.widths(options.samples))
+    early = {} if settings.early is None else settings.early.choices
+    choices = [{**settings.choices, **early}, settings.choices]
+    return settings.in_prototypes(fewest(choices, vectors, counts, options.processes))
+
+
 def calibrate(
     measured: DataSet,
     y: Labels,
@@ -169,6 +197,7 @@ def calibrate(
         jobs=options.processes,
         widths=dataset.widths(options.samples),
         early=settings.early,
+        prototypes=settings.prototypes,
         drawn=are_drawn(dataset),
         heading="calibrating" * options.progress,
     )

@@ -14,10 +14,6 @@ from edge.touch.arm import Chain, read_arm
 if TYPE_CHECKING:
     from edge.decide.model import Model
 
-NOISE_COUNTS = 0.7
-"""Noise of the fake skins that commands open. One that is calibrated with noise and then
-played without is taken for frozen."""
-
 
 def within(kind: type, low: float, high: float) -> Callable[[str], float]:
     """The type of an option that takes an int or a float from `low` to `high`."""
@@ -67,19 +63,6 @@ def add_skin(parser: argparse.ArgumentParser) -> None:
         metavar="REC.npz",
         help="need no hardware: play this recording onto fake chips, as fast as "
         "possible; without --skin, the chips are chosen to suit the recording",
-    )
-    parser.add_argument(
-        "--noise",
-        type=within(float, 0.0, 1000.0),
-        default=NOISE_COUNTS,
-        metavar="COUNTS",
-        help="noise of the fake chips of a --skin, as a standard deviation (default: "
-        "%(default)g)",
-    )
-    parser.add_argument(
-        "--real-time",
-        action="store_true",
-        help="play the recording at its original speed",
     )
     parser.add_argument(
         "--loop",

@@ -85,6 +85,7 @@ def open_skin(
     calibrated: bool = True,
     model: Model | None = None,
     joint_names: Sequence[str] | None = None,
+    real_time: bool = False,
 ) -> Iterator[Opened]:
     """The skin that the options name, closed at the end of the block.
 
@@ -94,15 +95,16 @@ def open_skin(
         model: its contact threshold is used if it is lower than the skin's.
         joint_names: the joint angles that a recording must have; they are put into
             this order.
+        real_time: play a recording at its original speed.
 
     Raises:
         InputError: the options or the skin's file cannot be used.
         EdgeError: the skin cannot be read.
     """
     if arguments.fake is not None:
-        opened = _played(arguments, joint_names)
-    elif arguments.loop or arguments.real_time:
-        raise InputError("--loop and --real-time work only with --fake REC.npz")
+        opened = _played(arguments, joint_names, real_time)
+    elif arguments.loop:
+        raise InputError("--loop works only with --fake REC.npz")
     elif arguments.skin is None:
         raise InputError("give --skin skin.toml, or --fake REC.npz to use no hardware")
     else:
@@ -120,7 +122,9 @@ def open_skin(
         yield opened
 
 
-def _played(arguments: argparse.Namespace, joint_names: Sequence[str] | None) -> Opened:
+def _played(
+    arguments: argparse.Namespace, joint_names: Sequence[str] | None, real_time: bool
+) -> Opened:
     """The recording of --fake, played onto fake chips."""
     from edge.wire.fake.player import play_file  # a robot has a skin
 
@@ -129,13 +133,12 @@ def _played(arguments: argparse.Namespace, joint_names: Sequence[str] | None) ->
         arguments.fake,
         file,
         joint_names=joint_names,
-        noise_counts=arguments.noise,
         loop=arguments.loop,
-        real_time=arguments.real_time,
+        real_time=real_time,
     )
     lasts_s = min(playback.ends, arguments.seconds)
     name = f"fake {arguments.fake}"
-    return Opened(skin, lasts_s, name, playback, virtual=not arguments.real_time)
+    return Opened(skin, lasts_s, name, playback, virtual=not real_time)
 
 
 @dataclass(frozen=True)
@@ -211,8 +214,7 @@ def reading(
         model: decides on the contacts; its arm and its angles are wanted, if no others.
         arm: whose angles are wanted.
         needs_joints: refuse a source without the angles that the model needs.
-        real_time: play a recording at its original speed, whatever the options say, as
-            a page always does.
+        real_time: play a recording at its original speed, as with a page.
         page: further arguments of `edge.app.sinks.page.Page`.
 
     Raises:
@@ -227,11 +229,12 @@ def reading(
     if arm is not None:
         names = arm.names
         dof = arm.dof
-    if arguments.fake is not None:
-        arguments.real_time |= real_time or arguments.web is not None
+    real_time |= arguments.web is not None
     played_names = names if arguments.joints is None else None
     with ExitStack() as stack:
-        opening = open_skin(arguments, model=model, joint_names=played_names)
+        opening = open_skin(
+            arguments, model=model, joint_names=played_names, real_time=real_time
+        )
         opened = stack.enter_context(opening)
         # Before this point a signal ends the program at once, as nothing can be lost.
         stop = stack.enter_context(stop_on(*ending_signals()))

@@ -281,9 +281,34 @@ class ModelInfo:
         return {name: task.factors for name, task in self.tasks.items() if task.factors}
 
     @property
+    def points_s(self) -> tuple[float, ...]:
+        """Windows for which the model can decide; uncalibrated, only the full one."""
+        return self.decision_points_s or (self.window_s,)
+
+    @property
     def has_label_distances(self) -> bool:
-        """Whether the graph gives the distances of the labels."""
+        """Whether the model gives the distances of the labels."""
         return bool(self.decision_points_s or self.products)
+
+    @property
+    def outputs(self) -> dict[str, tuple[str, tuple[int, ...]]]:
+        """{output of the model: its type, and its shape for one vector}."""
+        scores = ["out_of_range"]
+        if self.decision_points_s:
+            scores += ["novelty", "remoteness"]
+        outputs: dict[str, tuple[str, tuple[int, ...]]] = dict.fromkeys(
+            scores, ("float64", ())
+        )
+        for task, entry in self.tasks.items():
+            outputs |= {
+                f"{task}_label": ("int64", ()),
+                f"{task}_scores": ("float64", (len(entry.labels),)),
+                f"{task}_distances": ("float64", (entry.k,)),
+                f"{task}_neighbours": ("int64", (entry.k,)),
+            }
+            if self.has_label_distances:
+                outputs[f"{task}_label_distances"] = "float64", (len(entry.labels),)
+        return outputs
 
     @property
     def dof(self) -> int | None:

@@ -11,6 +11,9 @@ from collections import defaultdict
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
+import numpy as np
+
+from edge.arrays import Array
 from edge.errors import InputError
 
 OPERATORS = frozenset(
@@ -32,7 +35,6 @@ FUNCTIONS = 25
 NODES = 1
 INITIALIZERS = 5
 INPUTS = 11
-OUTPUTS = 12
 SPARSE = 15
 """Fields of a GraphProto."""
 OPERATOR = 4
@@ -44,10 +46,15 @@ WHOLE = 3
 NUMBERS = frozenset({1, 2, 3, 4, 7, 8, 20})
 """Fields of an attribute that is a number, a text or several numbers, not a tensor or a
 graph."""
+DIMENSIONS = 1
+TYPE = 2
 TENSOR_NAME = 8
+RAW_DATA = 9
 EXTERNAL_DATA = 13
 DATA_LOCATION = 14
 """Fields of a TensorProto."""
+TYPES = {1: "<f4", 5: "<i2", 7: "<i8", 9: "|b1", 11: "<f8"}
+"""{type of a TensorProto: its numbers} of those in an exported model."""
 
 DIGEST = b"rX\n\x14edge-classify-digest\x12@"
 """Begins the last field of an exported model: an entry of metadata of `DIGITS` digits,
@@ -80,12 +87,9 @@ class Contents:
     intact: bool = True
     """Whether its digest is there and right."""
     nodes: list[Node] = field(default_factory=list)
-    tensors: dict[str, Message] = field(default_factory=dict)
-    """{name of a constant: the fields of its TensorProto}."""
+    constants: dict[str, Array] = field(default_factory=dict)
+    """By their names."""
     metadata: dict[str, str] = field(default_factory=dict)
-    inputs: list[Message] = field(default_factory=list)
-    outputs: list[Message] = field(default_factory=list)
-    """The ValueInfoProtos of its inputs and outputs."""
     foreign: list[str] = field(default_factory=list)
     """Its contents that no exported model has, in words."""
 
@@ -159,8 +163,8 @@ def read(data: bytes, name: str) -> Contents:
         for graph in messages(model, GRAPH):
             _read_graph(graph, contents)
     # A field that runs past its message or is of no known kind; a number in place of
-    # bytes.
-    except (IndexError, TypeError, ValueError):
+    # bytes; a constant of an unknown type, or of another size than it says.
+    except (LookupError, TypeError, ValueError):
         contents.nodes.clear()
     if not contents.nodes:
         raise InputError(f"{name}: not an ONNX model; copy or export it again")
@@ -170,17 +174,21 @@ def read(data: bytes, name: str) -> Contents:
 
 
 def _read_graph(graph: Message, contents: Contents) -> None:
-    """Take in the nodes, constants, inputs and outputs of a graph."""
+    """Take in the nodes and constants of a graph."""
     if SPARSE in graph:
         contents.foreign.append(UNUSUAL)
     for fields in messages(graph, NODES):
         _read_node(fields, contents)
     for tensor in messages(graph, INITIALIZERS):
-        contents.tensors[text_of(tensor, TENSOR_NAME)] = tensor
         if EXTERNAL_DATA in tensor or any(tensor.get(DATA_LOCATION, ())):
             contents.foreign.append("weights in another file")
-    contents.inputs += messages(graph, INPUTS)
-    contents.outputs += messages(graph, OUTPUTS)
+        else:
+            numbers = np.frombuffer(tensor[RAW_DATA][-1], TYPES[tensor[TYPE][-1]])
+            shape = tensor.get(DIMENSIONS, [])
+            contents.constants[text_of(tensor, TENSOR_NAME)] = numbers.reshape(shape)
+    names = {text_of(value, 1) for value in messages(graph, INPUTS)}
+    for name in sorted(names - {"features", "decision_point"}):
+        contents.foreign.append(f"an input {name}")
 
 
 def _read_node(fields: Message, contents: Contents) -> None:

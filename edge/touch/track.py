@@ -84,7 +84,7 @@ class ContactTracker:
                 joint angles; without, on the skin.
             horizon_s: seconds from onset after which a contact's series takes in no
                 more.
-            measures: what is measured, as `edge.features.names.measures` makes it; None
+            measures: the measurements, as `edge.features.names.measures` makes it; None
                 measures what the paper's features take.
             max_contacts: how many are followed at once, the largest first.
 

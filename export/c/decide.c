@@ -119,7 +119,7 @@ static void ask(uint32_t index, bool refused) {
   a->flags |= flag(ec_arena[task->places.distances] == 0.0, EC_AS_TRAINED);
   a->flags |= flag(ties > 1, EC_TIE);
   a->confidence = EC_NAN;
-  if (!EC_CALIBRATED) return;
+  if (!EC_HAS_NOVELTY) return;
   double likely = confidence(&task->curves[question.point], index);
   if (index == EC_NAMING) likely *= known();
   a->confidence = rounded(likely);

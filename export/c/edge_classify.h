@@ -18,23 +18,23 @@ extern "C" {
 typedef enum { EC_ONSET_EVENT, EC_RELEASE_EVENT, EC_DECIDED_EVENT } ec_kind;
 typedef enum { EC_NOTHING, EC_CONFIDENCE, EC_WINDOW } ec_stopped_by;
 
-/* Reasons to doubt a decision: docs/formats.md. */
+/* Reasons to doubt a decision, in the order of docs/formats.md. */
 enum {
-  EC_SHORT = 1,
-  EC_MISSING_TAXELS = 2,
-  EC_MISSING_POSE = 4,
-  EC_AS_TRAINED = 8,
-  EC_OUT_OF_RANGE = 16,
-  EC_UNUSUAL = 32,
-  EC_UNKNOWN = 64,
-  EC_TIE = 128,
-  EC_UNSURE = 256,
-  EC_UNCERTIFIED = 512,
-  EC_GAP = 1024,
-  EC_FROZEN = 2048,
-  EC_LATE = 4096,
-  EC_STILL_JOINTS = 8192,
-  EC_JOINT_LIMITS = 16384
+  EC_SHORT = 1 << 0,
+  EC_GAP = 1 << 1,
+  EC_FROZEN = 1 << 2,
+  EC_STILL_JOINTS = 1 << 3,
+  EC_JOINT_LIMITS = 1 << 4,
+  EC_MISSING_TAXELS = 1 << 5,
+  EC_MISSING_POSE = 1 << 6,
+  EC_LATE = 1 << 7,
+  EC_AS_TRAINED = 1 << 8,
+  EC_OUT_OF_RANGE = 1 << 9,
+  EC_UNUSUAL = 1 << 10,
+  EC_UNKNOWN = 1 << 11,
+  EC_TIE = 1 << 12,
+  EC_UNSURE = 1 << 13,
+  EC_UNCERTIFIED = 1 << 14
 };
 
 typedef struct {
@@ -90,6 +90,20 @@ bool ec_is_touched(void);
 
 /* End the stream: tasks that wait are due, flagged EC_SHORT. */
 void ec_finish(void);
+
+/* Takes a letter of a text. */
+typedef void (*ec_put)(char letter);
+
+/* Write an event as a line of JSON, with the keys of `edge-classify run`. now_s: of the answer, on the
+   clock of the frames, from which a decision's latency is told. */
+void ec_json(const ec_event *event, double now_s, ec_put put);
+
+/* As ec_work and ec_push, with the events as lines of JSON; a frame for which ec_push is busy is
+   pushed again, after all that is due. */
+int ec_work_lines(double (*now_s)(void), ec_put put);
+int ec_push_lines(
+    const uint16_t *counts, const bool *valid, double t_s, const double *joints,
+    double (*now_s)(void), ec_put put);
 
 extern const char *const ec_task_names[];
 extern const char *const *const ec_labels[]; /* of each task */

@@ -64,7 +64,7 @@ enum { $quantity_names };
 #define EC_MOST_LABELS $most_labels
 #define EC_POINTS $windows_s_count
 #define EC_EARLY $early
-#define EC_CALIBRATED $calibrated
+#define EC_HAS_NOVELTY $has_novelty
 #define EC_NAMING $naming /* the task that names things; 255: none is unknown */
 
 #endif

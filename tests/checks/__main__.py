@@ -125,7 +125,7 @@ CHECKS = {
     ),
     "mutants": Program(
         module("tests.checks.mutants"),
-        "Random changes to the skin, labels, page and C: whether each is noticed.",
+        "Random words of the skin, labels, page and C are exchanged: is it noticed?",
     ),
     "remount": remount,
     "risk": Program(
@@ -148,8 +148,7 @@ CHECKS = {
     ),
     "transfer": transfer,
 }
-ENVIRONMENT = {"fuzz": {"FUZZ_FILES": "5000"}, "mutants": {"LOKY_MAX_CPU_COUNT": "1"}}
-"""mutmut forks, and worker processes that were started before a fork answer nobody."""
+ENVIRONMENT = {"fuzz": {"FUZZ_FILES": "5000"}}
 
 
 def help_of(check):

@@ -15,14 +15,12 @@ from edge.decide.early import fastest, stopping_rules
 from edge.decide.events import Decided
 from edge.decide.model import Model
 from edge.decide.verify import first_series
-from edge.errors import InputError, OutOfRange
+from edge.errors import InputError
 from edge.features.vector import FEATURES
 from edge.record.saving import save
 from export.api import save as save_model
-from tests.checks.hard_cases import exact
 from tests.checks.hard_cases.models import session
 from tests.conftest import PAPER, export, save_touches
-from tests.edge.decide.test_engines import assert_same_bits, hostile
 from tests.sequential import fitted_model
 from train.data.dataset import load_trials
 from train.model.pipeline import Choice
@@ -60,41 +58,9 @@ def decided(model, recording, error):
     return {event.task: event for event in events if isinstance(event, Decided)}
 
 
-def mean_of_roots(squares, unit):
-    """The mean of the whole roots of squares, in integers but for one division."""
-    wholes = [round(exact.root(round(square / unit**2))) for square in squares.tolist()]
-    return sum(wholes) / len(wholes) * unit
-
-
-def test_the_graph_measures_each_label_as_the_estimator_does(early, tmp_path):
-    """Labels of 100, 30 and 2 trials: a twentieth, the nearest three, and both there
-    are."""
-    rng = np.random.default_rng(0)
-    labels = rng.permutation(np.repeat(["common", "known", "rare"], [100, 30, 2]))
-    width = early.info.samples * len(FEATURES)
-    X = rng.normal(size=(3, len(labels), width))
-    queries = rng.normal(size=(9, width))
-    choices = {"t": Choice("none", 4, 3)}
-    path = tmp_path / "model.onnx"
-    sequential, model = fitted_model(path, early.info, choices, X, {"t": labels})
-    for point, fitted in enumerate(sequential.decision_points_):
-        for label, (size, count) in enumerate([(100, 5), (30, 3), (2, 2)]):
-            squares = fitted.tasks_["t"].squares(queries)[
-                :, fitted.tasks_["t"].labels == label
-            ]
-            assert squares.shape[1] == size
-            nearest = np.sort(squares, axis=1)[:, :count]
-            distances = model.run(queries, point)["t_label_distances"][:, label]
-            expected = [mean_of_roots(row, fitted.tasks_["t"].unit) for row in nearest]
-            assert distances.tolist() == [
-                fitted.tasks_["t"].slope * mean for mean in expected
-            ]
-
-
 @pytest.fixture(scope="module")
 def with_early_settings(early, tmp_path_factory):
-    """Vectors, and an estimator and a model whose tasks take other features and other
-    directions before 1.2 s; one of them shares a space with another there alone."""
+    """Vectors, and a model whose tasks take other features before 1.2 s."""
     rng = np.random.default_rng(3)
     X = rng.normal(size=(3, 45, early.info.width))
     choices = {
@@ -108,57 +74,17 @@ def with_early_settings(early, tmp_path_factory):
     }
     settings = EarlySettings(at_first, [at_first] * 10)
     path = tmp_path_factory.mktemp("early") / "model.onnx"
-    return X, *fitted_model(path, early.info, choices, X, LABELS, settings)
-
-
-def test_decision_points_may_have_features_and_directions_of_their_own(
-    with_early_settings,
-):
-    X, sequential, model = with_early_settings
-    queries = np.random.default_rng(4).normal(size=(9, X.shape[2]))
-    queries *= 10.0 ** np.arange(-2, 7)[:, None]
-    queries[0] = sequential.space_.points[1].mean  # nothing lies outside the components
-    scores = sequential.space_.scores(np.stack([queries] * 3))
-    for point, fitted in enumerate(sequential.decision_points_):
-        answers = model.run(queries, point)
-        for kind in ("novelty", "remoteness"):
-            assert min(answers[kind]) > 0.0
-            assert (answers[kind] == getattr(scores, kind)[point]).all()
-        for task in sequential.choices:
-            distances, rows = fitted.tasks_[task].neighbours(queries)
-            assert (answers[f"{task}_neighbours"] == rows).all()
-            assert (answers[f"{task}_distances"] == distances).all()
-    for fitted in sequential.decision_points_[0].tasks_.values():
-        assert len(fitted.space.columns) == len(queries[0]) // len(FEATURES)
+    return X, fitted_model(path, early.info, choices, X, LABELS, settings)[1]
 
 
 def test_a_far_feature_matters_only_where_a_decision_point_takes_it(
     with_early_settings,
 ):
-    X, _, model = with_early_settings
+    X, model = with_early_settings
     far = X[0, :1].copy()
     far[0, 0] = 1e6
     outside = [model.run(far, point)["out_of_range"].tolist() for point in range(3)]
     assert outside == [[0.0], [0.0], [1.0]]
-
-
-def test_what_is_not_finite_is_refused_at_points_that_do_not_take_it(
-    with_early_settings,
-):
-    X, sequential, model = with_early_settings
-    wrong = X[0, 0].copy()
-    wrong[0] = np.nan
-    for point in range(3):
-        answers = model.run(wrong[None], point)
-        assert all(answers[f"{task}_label"] == -1 for task in sequential.choices)
-        with pytest.raises(OutOfRange):
-            model.decide(wrong, point)
-
-
-def test_early_settings_are_the_same_bits_in_numpy(with_early_settings):
-    _, _, model = with_early_settings
-    rng = np.random.default_rng(2)
-    assert_same_bits(model.path, hostile(model.info.width, rng))
 
 
 def test_a_stream_that_ends_before_any_rule_is_sure_is_decided_at_its_end(

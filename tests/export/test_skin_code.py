@@ -2,8 +2,11 @@
 frame."""
 
 import ctypes
+import json
 import math
 import shutil
+import socket
+import struct
 import subprocess
 from argparse import Namespace
 from dataclasses import replace
@@ -14,23 +17,27 @@ import pytest
 
 from edge import demo
 from edge.app.commands import calibrate
+from edge.decide.classifier import Classifier
 from edge.decide.model import Model
 from edge.errors import EdgeError, InputError
+from edge.record.recording import Frame, load
 from edge.wire.bus.crc import crc16, sealed
 from edge.wire.bus.protocol import BusError, read, write
 from edge.wire.bus.serial_bus import decode, encode
 from edge.wire.chips import block
 from edge.wire.fake.clock import Hand, VirtualClock
-from edge.wire.fake.player import calibrated, fake_buses
+from edge.wire.fake.player import Playback, calibrated, fake_buses
 from edge.wire.skin import file as skinfile
 from edge.wire.skin.decoder import dead_band, stuck_limits
 from edge.wire.skin.file import TaxelCalibration
 from edge.wire.skin.skin import Skin
-from export import skin_code
+from export import c_code, skin_code
 from export.cli import _write_c as write_c
 from export.cli import main
 from tests.checks.faults import KINDS, SKINS
 from tests.edge.wire.skin.test_bus_reader import SMALL
+from tests.export.microcontroller import machine
+from tests.export.microcontroller.comparison import needs_qemu
 from tests.export.microcontroller.machine import COMMON, HERE
 from tests.faulty import Fault, FaultyBus, one_bus
 
@@ -109,6 +116,30 @@ class Wired:
         return [bus.log for bus in self.buses]
 
 
+def now(wired, wait):
+    """What `ec_clock_us` answers."""
+    hand = wired.clock.hands[0]
+    if wait:
+        hand.advance(wait / HZ)
+    return int(hand.now() * HZ) & 0xFFFFFFFF
+
+
+def carried(wired, bus, address, out, m):
+    """The outcome of `ec_i2c`, and the bytes that it reads."""
+    bus = wired.buses[bus]
+    messages = [write(address, out)] if out else []
+    messages += [read(address, m)] if m else []
+    try:
+        if not messages:
+            bus.reopen()
+            return 0, b""
+        bus.transfer(bus.prepare(*messages))
+    except BusError as error:
+        kinds = [type(error) is kind for kind in skin_code.OUTCOMES[:-1]]
+        return 1 + (kinds.index(True) if any(kinds) else len(kinds)), b""
+    return 0, messages[-1].buffer.tobytes() if m else b""
+
+
 class Library:
     """The skin in C, compiled, over wired chips."""
 
@@ -138,26 +169,12 @@ class Library:
             getattr(self.c, name).restype = ctypes.c_bool
 
     def _now(self, wait):
-        hand = self.wired.clock.hands[0]
-        if wait:
-            hand.advance(wait / HZ)
-        return int(hand.now() * HZ) & 0xFFFFFFFF
+        return now(self.wired, wait)
 
     def _carry(self, bus, address, out, n, into, m):
-        bus = self.wired.buses[bus]
-        messages = [write(address, bytes(out[:n]))] if n else []
-        messages += [read(address, m)] if m else []
-        try:
-            if not messages:
-                bus.reopen()
-                return 0
-            bus.transfer(bus.prepare(*messages))
-        except BusError as error:
-            kinds = [type(error) is kind for kind in skin_code.OUTCOMES[:-1]]
-            return 1 + (kinds.index(True) if any(kinds) else len(kinds))
-        if m:
-            ctypes.memmove(into, messages[-1].buffer.tobytes(), m)
-        return 0
+        outcome, data = carried(self.wired, bus, address, bytes(out[:n]), m)
+        ctypes.memmove(into, data, len(data))
+        return outcome
 
     def start(self):
         return self.c.ec_skin_begin()
@@ -452,3 +469,59 @@ def test_beside_a_model_the_lower_threshold_holds_and_one_scale_of_counts(tmp_pa
     model.info = replace(model.info, layout=replace(layout, counts_per_newton=500.0))
     with pytest.raises(InputError, match="cody.toml: counts_per_newton differs"):
         write_c(options, model)
+
+
+def serve(wired, port, until_s):
+    """Answer a board at a socket, until a time of the clock."""
+    while wired.clock.now() < until_s:
+        (kind, amount) = struct.unpack("<HI", port.recv(6, socket.MSG_WAITALL))
+        if kind == 0xFFFF:
+            port.sendall(now(wired, amount).to_bytes(4, "little"))
+            continue
+        n = amount & 0xFFFF
+        out = port.recv(n, socket.MSG_WAITALL) if n else b""
+        bus, address = divmod(kind, 256)
+        outcome, data = carried(wired, bus, address, out, amount >> 16)
+        port.sendall(bytes([outcome]) + data)
+
+
+@pytest.mark.slow
+@needs_qemu
+def test_a_board_without_an_operating_system_prints_the_events_of_run(tmp_path):
+    model = machine.without_an_arm(Model(demo.MODEL))
+    cody = skinfile.load(skinfile.shipped("cody"))
+    chip = replace(FILES["block"].chips[0], taxels=tuple(range(384)))
+    buses = (replace(FILES["block"].buses[0], chips=(chip,)),)
+    slowly = replace(cody.reading, rate_hz=25.0)
+    file = calibrated(replace(cody, buses=buses, reading=slowly), 2.0)
+    skin_code.export(file, tmp_path, hz=HZ)
+    c_code.export(model, tmp_path)
+    gcc, qemu = machine.tools("M0+", "nosys")
+    sources = [path for path in tmp_path.glob("*.c") if path.name != "main.c"]
+    words = [*gcc, *COMMON, "-I", tmp_path, *sources, machine.CORTEX / "main.c"]
+    subprocess.run([*words, "-lm", "-o", tmp_path / "decide"], check=True)
+    touch = load(demo.FOLDER / "pillow-movable.npz")
+    wires = [Wired(file, Playback(touch)) for _ in range(2)]
+    seconds = touch.t[-1] - touch.t[0] + 1.0
+    reader = Reference(file, wires[0])
+    classifier = Classifier(model, file.layout)
+    frames = frames_of(reader, wires[0], [], int(seconds * file.reading.rate_hz))
+    expected = [
+        event.to_dict()
+        for t, counts, valid, *_ in frames[1:]
+        for event in classifier.push(Frame(t, counts, valid))
+    ]
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        ports = ["-serial", f"file:{tmp_path / 'events'}"]
+        ports += ["-serial", f"tcp:127.0.0.1:{server.getsockname()[1]},nodelay=on"]
+        words = [*qemu, tmp_path / "decide", "-monitor", "none", *ports]
+        with subprocess.Popen(words) as board:
+            port, _ = server.accept()
+            serve(wires[1], port, BEGIN_S + seconds)
+            board.kill()
+    lines = [*map(json.loads, (tmp_path / "events").read_text().splitlines())]
+    assert [line["event"] for line in lines].count("decision") == len(model.info.tasks)
+    for line, event in zip(lines, expected, strict=True):
+        assert line["onset_s"] == pytest.approx(event["onset_s"], abs=0.05)
+        for key in {*line} - {"onset_s", "latency_ms", "confidence"}:
+            assert line[key] == event[key]

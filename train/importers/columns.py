@@ -128,19 +128,16 @@ def columns(table: Table, terms: str) -> list[str]:
 
 def _term(table: Table, term: str) -> list[str]:
     names = list(table.file_names) or table.names
-    for all_names in (names, table.names):
-        if term in all_names:
-            return [term]
-    array = [name for name in names if name.startswith(f"{term}.")]
-    if array:
+    if term in [*names, *table.names]:
+        return [term]
+    if array := [name for name in names if name.startswith(f"{term}.")]:
         return array
     ends = term.split("-")
     for places in (names, numbered("", len(names))):
         if len(ends) <= 2 and set(ends) <= set(places):
-            first = places.index(ends[0])
-            last = places.index(ends[-1])
-            if first <= last:
-                return names[first : last + 1]
+            span = names[places.index(ends[0]) : places.index(ends[-1]) + 1]
+            if span:
+                return span
     raise InputError(
         f"{table.where}: has no column {term[:40]}; it has {short_text(names)}"
     )
@@ -176,32 +173,24 @@ def meaning(table: Table, options: TableOptions) -> Meaning:
         used.add(column(table, "--onset-column", options.onset_column))
     rest = [name for name in table.names if name not in used]
     taxels, shape = _taxels(table, rest, options)
-    for name in sorted(set(taxels).difference(rest)):
+    for name in used.intersection(taxels):
         raise InputError(
             f"{table.where}: column {name} is named both as a taxel and as time, joint "
             "or onset"
         )
-    felt = set(taxels)
-    left_out = [name for name in rest if name not in felt]
+    left_out = [name for name in rest if name not in set(taxels)]
     unit, source = _unit(table, time, options)
     is_told = any((table.named, table.shape, options.taxels))
     # A form that makes the time, or a column of each taxel, knows what they are.
     is_told |= time is not None and time not in (table.file_names or table.names)
-    shape = table.shape or shape
     return Meaning(taxels, joints, left_out, shape, time, unit, source, not is_told)
 
 
 def _time_column(
-    table: Table,
-    joints: Sequence[str],
-    options: TableOptions,
+    table: Table, joints: Sequence[str], options: TableOptions
 ) -> str | None:
     """The column of times; None where --rate gives them."""
     if options.time:
-        if options.rate is not None:
-            raise InputError(
-                f"{table.where}: --time and --rate tell one thing; give one"
-            )
         return column(table, "--time", options.time)
     if options.rate is not None:
         return None
@@ -217,9 +206,10 @@ def _time_column(
 def named_times(table: Table, joints: Sequence[str] = ()) -> list[str]:
     """The column that is called a time, the one with most values where there are
     several, or else the only one of dates."""
-    dates = [name for name in table.names if is_date(table, name)]
-    named = [n for n in filter(TIME.fullmatch, table.names) if n not in joints]
+    names = [name for name in table.data if name not in joints]
+    dates = [name for name in names if is_date(table, name)]
     numbers = table.data.select_dtypes("number").columns
+    named = list(filter(TIME.fullmatch, names))
     named = [name for name in named if name in dates or name in numbers] or named
     if named:
         return [max(named, key=lambda name: table.data[name].nunique())]
@@ -235,22 +225,17 @@ def is_date(table: Table, name: str) -> bool:
 
 
 def _taxels(
-    table: Table,
-    rest: list[str],
-    options: TableOptions,
+    table: Table, rest: list[str], options: TableOptions
 ) -> tuple[list[str], tuple[int, ...]]:
-    """The taxels, and their shape where their names tell it."""
+    """The taxels, and their shape where the table or their names tell it."""
     if options.taxels:
-        return columns(table, options.taxels), ()
+        return columns(table, options.taxels), table.shape
     arrays = table.arrays.values()
-    complete = [names for names in arrays if len(names) == math.prod(table.shape)]
-    if table.shape and len(complete) == 1:
-        return complete[0], ()
-    candidates = set(table.candidates)
-    if not table.named:
-        numbers = table.data.select_dtypes(["number", "bool"]).columns
-        return [name for name in rest if name in numbers] or rest, ()
-    return _running(table, list(filter(candidates.__contains__, rest)))
+    frames = [names for names in arrays if len(names) == math.prod(table.shape)]
+    if table.shape and len(frames) == 1:
+        return frames[0], table.shape
+    candidates = table.candidates(rest)
+    return _running(table, candidates) if table.named else (candidates, table.shape)
 
 
 def _running(table: Table, rest: Sequence[str]) -> tuple[list[str], tuple[int, ...]]:

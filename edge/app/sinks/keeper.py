@@ -19,12 +19,12 @@ from edge.decide.events import Decided
 from edge.decide.info import ModelInfo
 from edge.decide.model import Model
 from edge.errors import EdgeError, InputError, counted
-from edge.record.changes import alone
+from edge.record.changes import CHANGES
 from edge.record.labels import read_table
 from edge.record.recording import read_meta
 from edge.record.saving import save
 from edge.touch.frame import Frame
-from edge.writing import check_writable
+from edge.writing import alone, check_writable
 
 REASONS = ("unsure", "unknown", "unusual", "all")
 LONGEST_S = 10.0
@@ -191,7 +191,7 @@ class Keeper:
         if excess <= 0:
             return
         # Who changes labels here keeps all; the next touch makes room.
-        with suppress(InputError), alone(self._folder):
+        with suppress(InputError), alone(self._folder, CHANGES):
             rows = read_table(self._folder).rows
             for file, size in sizes.items():
                 if excess > 0 and file.name not in rows and not is_labelled(file):

@@ -220,6 +220,11 @@ bool ec_skin_begin(void) {
   return ec_chips_begin();
 }
 
+/* The clock begins with what it wraps at, so that no time is 0. */
+static double seconds(uint64_t t) { return (double)(t - (UINT64_C(1) << 32)) / EC_HZ; }
+
+double ec_now_s(void) { return seconds(ec_time()); }
+
 bool ec_skin_poll(uint32_t now_us, ec_frame *frame) {
   uint64_t now = ec_time();
   uint64_t t = now - (uint32_t)((uint32_t)now - now_us);
@@ -228,7 +233,7 @@ bool ec_skin_poll(uint32_t now_us, ec_frame *frame) {
   ec_due += (1 + (t - ec_due) / EC_PERIOD) * EC_PERIOD; /* ticks that have passed are skipped */
   ec_chips_read(t + EC_PERIOD - EC_LONGEST_STEP);
   assemble(t);
-  frame->t_s = (double)(t - (UINT64_C(1) << 32)) / EC_HZ;
+  frame->t_s = seconds(t);
   frame->counts = counts;
   frame->valid = valid;
   return true;

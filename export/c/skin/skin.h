@@ -55,6 +55,9 @@ bool ec_skin_begin(void);
 /* Read a frame if it is due by the time of the clock, and bring chips back that have failed. */
 bool ec_skin_poll(uint32_t now_us, ec_frame *frame);
 
+/* The time on the clock of the frames. */
+double ec_now_s(void);
+
 /* How many chips run, of EC_CHIPS. */
 uint16_t ec_chips_running(void);
 

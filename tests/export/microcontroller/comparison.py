@@ -8,6 +8,10 @@ import pytest
 from export import c_code
 from tests.export.microcontroller import machine
 
+TOOLS = ("arm-none-eabi-gcc", "qemu-system-arm")
+needs_qemu = pytest.mark.skipif(
+    not all(map(shutil.which, TOOLS)), reason=f"there is no {' or no '.join(TOOLS)}"
+)
 needs_gcc = pytest.mark.skipif(shutil.which("gcc") is None, reason="there is no gcc")
 
 

@@ -48,7 +48,7 @@ static void give_outputs(void) {
   }
   if (refused) return;
   give(ec_arena + EC_PLACE_OUT_OF_RANGE, 1);
-  if (!EC_CALIBRATED) return;
+  if (!EC_HAS_NOVELTY) return;
   give(ec_arena + EC_PLACE_NOVELTY, 1);
   give(ec_arena + EC_PLACE_REMOTENESS, 1);
 }

@@ -3,14 +3,18 @@
 import math
 import struct
 import subprocess
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
 from edge.decide.classifier import Classifier, suited
 from edge.decide.events import Decided, Onset, Release
+from edge.decide.flags import FLAGS as ALL_FLAGS
+from tests.conftest import ROOT
 
 HERE = Path(__file__).parent
+CORTEX = ROOT / "docs" / "examples" / "firmware" / "cortex"
 VECTOR, VECTORS_OF_RECORDING, COSTS, SELFTEST, EVENTS_OF_RECORDING = range(5)
 ABOUT_ITSELF = struct.pack("<II", SELFTEST, 0)
 """The question whether `ec_selftest` passes."""
@@ -30,21 +34,25 @@ BOARDS = {
 }
 """{processor: its name for gcc, its options, QEMU's board, where code and RAM lie}. QEMU
 has no board with a Cortex-M0+ of enough memory; its code runs on a Cortex-M3."""
-FLAGS = (
-    "short missing_taxels missing_pose as_trained out_of_range unusual unknown tie unsure "
-    "uncertified gap frozen late still_joints joint_limits".split()
-)
+LACKING = ("no_contact", "speed", "near_contact", "skin_motion")
+FLAGS = [flag for flag in ALL_FLAGS if flag not in LACKING]
 """In the order of their bits in C."""
 FIELDS = 10
 """Numbers of an event."""
 
 
-def tools(board):
+def without_an_arm(model):
+    """A model that takes motion on the skin."""
+    model.info = replace(model.info, chain=None, joints=0, motion_frame="skin")
+    return model
+
+
+def tools(board, specs="rdimon"):
     """The words that compile for a processor, and those that run a program on it."""
     cpu, options, machine, code, ram = BOARDS[board]
     gcc = ["arm-none-eabi-gcc", f"-mcpu={cpu}", "-mthumb", *options.split()]
-    gcc += ["--specs=rdimon.specs", f"-Wl,--defsym=CODE={code},--defsym=RAM={ram}"]
-    gcc += ["-T", HERE / "board.ld", HERE / "startup.c"]
+    gcc += [f"--specs={specs}.specs", f"-Wl,--defsym=CODE={code},--defsym=RAM={ram}"]
+    gcc += ["-T", CORTEX / "board.ld", CORTEX / "startup.c"]
     qemu = f"qemu-system-arm -M {machine} -nographic -semihosting -kernel"
     return gcc, qemu.split()
 

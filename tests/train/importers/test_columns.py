@@ -100,8 +100,6 @@ def test_a_rate_is_taken_before_a_column_and_one_of_them_is_needed():
     sense = sense_of(table("t", "s1"), rate=10)
     assert sense.time is None
     assert sense.left_out == ["t"]
-    with pytest.raises(InputError, match="--time and --rate"):
-        sense_of(table("t", "s1"), rate=10, time="t")
     with pytest.raises(InputError, match="give --rate"):
         sense_of(table("s1"))
 

@@ -346,7 +346,7 @@ def record(code, *contents):
 @pytest.mark.parametrize(
     ("profile", "encoding", "word"),
     [
-        ("", "protobuf", "protobuf (maker.Skin on /skin)"),
+        ("", "protobuf", "protobuf (maker.Skin)"),
         ("ros2", "flatbuffer", "flatbuffer"),
         ("", "cdr", "another profile"),
     ],

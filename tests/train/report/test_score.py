@@ -14,7 +14,6 @@ from train.report.score import (
     majority,
     paired,
     points,
-    score,
 )
 
 ONE = ("max_force",)
@@ -27,14 +26,6 @@ def test_the_best_cell_is_reported_with_its_answers():
     table = accuracies(neighbours(vectors.X, features=ONE), y)
     assert best.accuracy == table.max() == table[best.components - 1, best.k - 1]
     assert best.right == int((best.answers == y).sum())
-
-
-def test_a_result_has_the_same_columns_whether_a_grid_was_searched_or_not():
-    searched = score(Result(10, 20, components=3, k=2))
-    without = score(Result(10, 20))
-    columns = ["accuracy %", "from %", "to %", "k", "components"]
-    assert list(searched) == list(without) == columns
-    assert (searched["k"], without["k"]) == (2, "")
 
 
 def test_an_interval_is_in_whole_percent():

@@ -15,7 +15,6 @@ import pytest
 from edge import demo
 from edge.errors import InputError
 from edge.record.saving import save
-from tests import browser
 from tests.conftest import save_touches
 from train.__main__ import main
 from train.data.dataset import load_trials
@@ -24,7 +23,6 @@ from train.study.paper import (
     comparison,
     difference,
     entries,
-    mean_of,
 )
 from train.study.run import require_scene
 
@@ -68,11 +66,6 @@ def test_a_perfect_replication_differs_by_the_chance_of_both_samples():
     assert 0.03 < out < 0.07
 
 
-def test_several_data_sets_count_as_their_mean():
-    key = ("I", "1", "t")
-    assert mean_of([{key: 80.0}, {key: 90.0}]) == {key: 85.0}
-
-
 @pytest.fixture(scope="module")
 def studied(tmp_path_factory):
     folder = tmp_path_factory.mktemp("touches")
@@ -106,11 +99,6 @@ def test_equal_scalings_are_equal(studied):
     assert list(scaled.index) == ["category", "object"]
     assert (scaled["I"] == scaled["II"]).all()
     assert (scaled["none"] == scaled["III"]).all()
-
-
-@pytest.mark.slow
-def test_in_a_browser_nothing_overflows_or_is_missing(studied):
-    assert browser.faults(studied / "report.html") == []
 
 
 @pytest.mark.parametrize(

@@ -178,10 +178,6 @@ class TestBoard:
             with pytest.raises(InputError, match="not a board file: .*; make one with"):
                 board.read(path)
 
-    def test_arithmetic_is_the_sum_of_three_stages(self):
-        stages = {"track": (1e6, 2e6), "features": (3e6, 4e6), "decision": (10e6, 11e6)}
-        assert board.Board("b", "d", stages, 60.0, 500.0, "m").arithmetic_s == 14.0
-
 
 def board_file(path, digest):
     stage = {"median_us": 100.0, "p99_us": 200.0}

@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 
 from edge.app.commands import calibrate
-from edge.app.options import NOISE_COUNTS
 from edge.record import recording, saving
+from edge.wire.fake import player
+from edge.wire.fake.player import NOISE_COUNTS
 from edge.wire.skin import file as skinfile
 from edge.wire.skin.calibration import (
     NOISY,
@@ -64,22 +65,11 @@ def test_the_fakes_rest_values_are_measured_and_the_old_file_is_kept(
     assert edge("check", skin)[1][0]["remarks"] == []
 
 
-@pytest.mark.parametrize(
-    ("options", "deviation"),
-    # Rounding to whole counts adds a variance of 1/12.
-    [((), (NOISE_COUNTS**2 + 1 / 12) ** 0.5), (("--noise", 3), (9 + 1 / 12) ** 0.5)],
-)
-def test_a_fake_makes_noise_so_that_its_dead_bands_are_rehearsed(
-    skin,
-    quiet,
-    measured,
-    options,
-    deviation,
-):
-    assert measured(quiet, "--noise", 0)[1]["noise_largest"] == 0.0
-    first, repetition = (measured(quiet, *options, frames=90)[1] for _ in range(2))
+def test_a_fake_makes_noise_so_that_its_dead_bands_are_rehearsed(skin, quiet, measured):
+    first, repetition = (measured(quiet, frames=90)[1] for _ in range(2))
     assert first == repetition
     file = skinfile.load(skin)
+    deviation = (NOISE_COUNTS**2 + 1 / 12) ** 0.5  # of rounding to whole counts too
     assert (file.calibration.noise**2).mean() ** 0.5 == pytest.approx(
         deviation, rel=0.03
     )
@@ -281,11 +271,13 @@ def test_a_calibration_that_would_make_taxels_deaf_is_refused(
     calibrated,
     quiet,
     measured,
+    monkeypatch,
 ):
-    status, _, err = measured(quiet, "--noise", 9)
+    monkeypatch.setattr(player, "NOISE_COUNTS", 9.0)
+    status, _, err = measured(quiet)
     assert status == 2
     assert "would be deaf" in err
-    assert measured(quiet, "--noise", 9, "--force")[0] == 0
+    assert measured(quiet, "--force")[0] == 0
     status, (event,), _ = edge("check", calibrated)
     assert status == 1
     assert any("taxels deaf, such as" in remark for remark in event["remarks"])

@@ -48,7 +48,7 @@ def test_a_person_gets_sentences(edge, monkeypatch):
     for name, task in INFO.tasks.items():
         assert f"{name}: {task.accuracy:.1%} accurate (nested)" in out
     assert "Skin: 16 x 24 taxels, closed around" in out
-    assert f"Fitted on {INFO.rows} trials" in out
+    assert f"Compares with {INFO.rows} trials" in out
     assert "Of touches of each object that it has not met" in out
     assert max(map(len, out.splitlines())) <= 80
 

@@ -3,12 +3,14 @@ trials."""
 
 import os
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 import edge
 from edge import demo
+from edge.app.sinks.page import _way_to
 from edge.app.sinks.sink import Fault
 from edge.decide.events import Decided, Onset
 from edge.errors import InputError
@@ -57,6 +59,29 @@ def test_a_picture_has_shear_where_the_skin_gives_it(page, pictures):
     assert pictures[-1]["shear"] == [[3, -4]] * 24
     page.push(replace(frame, t=9.0))
     assert "shear" not in pictures[-1]
+
+
+def test_a_picture_has_the_rate_of_the_loop(page, pictures):
+    median = {50: 0.0125}.__getitem__
+    page.schedule = SimpleNamespace(
+        missed_ticks=3, periods=SimpleNamespace(percentile=median)
+    )
+    page.push(next(frames()))
+    assert (pictures[0]["rate_hz"], pictures[0]["missed"]) == (80.0, 3)
+
+
+@pytest.mark.parametrize("folder", ["RUNTIME_DIRECTORY", "XDG_RUNTIME_DIR"])
+def test_the_journal_gets_the_name_of_a_file_that_its_owner_alone_reads(
+    monkeypatch, tmp_path, folder
+):
+    monkeypatch.delenv("RUNTIME_DIRECTORY", raising=False)
+    monkeypatch.setenv("JOURNAL_STREAM", "8:1")
+    monkeypatch.setenv(folder, str(tmp_path))
+    sentence = _way_to("http://x")
+    (file,) = tmp_path.iterdir()
+    assert sentence.endswith(str(file))
+    assert file.read_text() == "http://x\n"
+    assert file.stat().st_mode & 0o77 == 0
 
 
 def test_pictures_come_ten_times_a_second(page, pictures):
@@ -117,7 +142,7 @@ def files(page, **asked):
 
 
 def undo(page):
-    act(page, "undo", time=last(page)[0]["time"])
+    act(page, "undo", time=last(page)["time"])
 
 
 def last(page):
@@ -130,10 +155,11 @@ def test_labels_and_recording_are_set_from_the_page(page):
     with pytest.raises(InputError, match="give a label first"):
         act(page, "record", on=True)
 
-    act(page, "labels", labels={" object ": "box "})
-    act(page, "record", on=True)
+    act(page, "labels", labels={" object ": f"{'b' * 80} "})
+    assert page.labels == {"object": "b" * 80}
+    assert not page.recording
 
-    assert page.labels == {"object": "box"}
+    act(page, "record", on=True)
     assert page.recording
 
 
@@ -145,6 +171,8 @@ def test_labels_and_recording_are_set_from_the_page(page):
         {"do": "labels"},
         {"do": "labels", "labels": {"object": 3}},
         {"do": "labels", "labels": {"object": "a\nb"}},
+        {"do": "labels", "labels": {"object": "b" * 81}},
+        {"do": "labels", "labels": {}},
         {"do": "relabel", "touches": [], "labels": {"object": ""}},
         {"do": "relabel", "touches": [{"file": 5}], "labels": {"object": "box"}},
         {"do": "leave_out", "touches": [{**SEEN, "file": "../model.onnx"}]},
@@ -200,6 +228,7 @@ def folder_page(tmp_path, serve):
 
 def test_a_damaged_recording_is_named_and_left_out(folder_page):
     assert sorted(files(folder_page)) == ["a.npz", "b.npz"]
+    assert files(folder_page, start=-1) == files(folder_page)
     folder_page.look()
     (notice,) = folder_page._notices
     assert "c.npz" in notice
@@ -210,14 +239,12 @@ def test_the_last_change_is_undone_unless_it_is_another_than_was_shown(folder_pa
     change(folder_page, "relabel", "a.npz", **SPONGE)
     shown = last(folder_page)
     change(folder_page, "leave_out", "b.npz")
+    assert shown["command"] == "relabel a.npz object=sponge"
     with pytest.raises(InputError, match="have been changed since"):
-        act(folder_page, "undo", time=shown[0]["time"])
+        act(folder_page, "undo", time=shown["time"])
     undo(folder_page)
-    assert last(folder_page) == shown
-    assert shown[0]["command"] == "relabel a.npz object=sponge"
-    undo(folder_page)
-    assert last(folder_page) == []
-    assert [touch["labels"] for touch in listed(folder_page)] == [TOUCH.labels] * 2
+    assert last(folder_page) is None
+    assert not any(touch["left_out"] for touch in listed(folder_page))
 
 
 def test_what_is_left_out_stays_in_the_list_and_is_put_back(folder_page, tmp_path):
