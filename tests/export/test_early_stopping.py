@@ -161,8 +161,8 @@ def test_a_touch_unlike_all_others_waits_and_is_flagged_as_unusual(
     ordinary = make_touch(kind="hard", seed=50)
     for touch, rate, stop in (
         (ordinary, error, (0.3, "confidence", False)),
-        (strange, error, (1.2, "window", True)),
-        (strange, None, (1.2, "window", True)),
+        (strange, error, (1.2, "confidence", True)),
+        (strange, None, (1.2, None, True)),
     ):
         for event in decided(model, touch, rate).values():
             flagged = "unusual" in event.flags
