@@ -93,7 +93,7 @@ def test_the_golden_file_holds_what_is_answered_at_each_decision_point(early, fo
     for point, vectors in enumerate(golden["decision_point_vectors"]):
         answers = early.run(vectors, point)
         for task in early.info.tasks:
-            stored = golden[f"{task}_decision_point_distances"][point]
+            stored = golden[f"decision_point_{task}_distances"][point]
             np.testing.assert_array_equal(stored, answers[f"{task}_distances"])
 
 
