@@ -184,8 +184,8 @@ def test_what_a_board_lacks_comes_with_its_remedy(board, monkeypatch):
 
 def test_check_without_a_skin_prints_the_board(edge, monkeypatch):
     rows = [
-        board_module.Row("disk", "5 MB", "delete"),
-        board_module.Row("python", "3.11"),
+        board_module.Fact("disk", "5 MB", "delete"),
+        board_module.Fact("python", "3.11"),
     ]
     monkeypatch.setattr(board_module, "look", lambda: rows)
     status, (event,), _ = edge("check")
