@@ -37,7 +37,7 @@ class Task:
 
     Attributes:
         labels: the answers, in the order of the scores.
-        k: neighbours that vote.
+        k: neighbours that vote; 0 of another scorer than k-NN.
         components: coordinates that distances are measured in.
         scaling: "none", "columns" or "I" to "V" (paper, Eqs. 1 to 5).
         accuracy: nested accuracy of the whole choice at export, 0 to 1.
@@ -51,7 +51,7 @@ class Task:
     """
 
     labels: tuple[str, ...]
-    k: int = field(metadata={"allowed": range(1, 1 << 31)})
+    k: int = field(metadata={"allowed": range(1 << 31)})
     components: int = field(metadata={"allowed": range(1 << 31)})
     scaling: str
     accuracy: float = field(metadata={"low": 0.0, "high": 1.0})
@@ -247,6 +247,8 @@ class ModelInfo:
     onset: str = ""
     """What tells the onsets other than the skin, see `edge.touch.frame.ONSETS`; empty where
     the skin does."""
+    scorer: str = "knn"
+    """What gives the distances of labels, one of `edge.decide.engines.SCORERS`."""
     speeds: tuple[float, ...] = limited((), count=2)
     """Least and greatest speed of the joints before onset, in radians a second, for
     which the training trials speak; empty where not known."""
@@ -305,12 +307,11 @@ class ModelInfo:
             scores, ("float64", ())
         )
         for task, entry in self.tasks.items():
-            outputs |= {
-                f"{task}_label": ("int64", ()),
-                f"{task}_scores": ("float64", (len(entry.labels),)),
-                f"{task}_distances": ("float64", (entry.k,)),
-                f"{task}_neighbours": ("int64", (entry.k,)),
-            }
+            outputs[f"{task}_label"] = "int64", ()
+            outputs[f"{task}_scores"] = "float64", (len(entry.labels),)
+            if entry.k:
+                outputs[f"{task}_distances"] = "float64", (entry.k,)
+                outputs[f"{task}_neighbours"] = "int64", (entry.k,)
             if self.has_label_distances:
                 outputs[f"{task}_label_distances"] = "float64", (len(entry.labels),)
         return outputs
