@@ -475,9 +475,12 @@ def test_trials_and_labels_in_arrays_and_parquet_are_texts(folder):
 
 
 def test_onsets_from_outside_are_kept(folder):
-    put(folder, {"cup_1.csv": "t,s1,grip\n0,1,0\n0.1,2,0\n0.2,2,1\n0.3,2,1\n"})
+    put(folder, {"cup_1.csv": "t,s1,grip\n0,1,0\n0.1,2,1\n0.2,2,1\n0.3,2,0\n0.4,2,1\n"})
     _, recordings = imported(folder, "--onset-column", "grip")
     onset = recordings["cup_1"].meta["onset"]
-    assert onset == {"source": "event", "times_s": [pytest.approx(0.2)]}
+    assert onset == {
+        "source": "event",
+        "times_s": [pytest.approx(0.1), pytest.approx(0.4)],
+    }
     _, recordings = imported(folder, "--onset", "first")
     assert recordings["cup_1"].meta["onset"] == {"source": "first", "times_s": [0.0]}
