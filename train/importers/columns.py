@@ -253,15 +253,20 @@ def _running(table: Table, rest: Sequence[str]) -> tuple[list[str], tuple[int, .
             f"{table.where}: are the taxels {spans}? Name them by --taxels "
             f"{grids[0][0][0]}-{grids[0][0][-1]}, and joint angles by --joints"
         )
-    three = ", or --axes xyz for taxels of three axes" * any(map(lettered, rest))
+    raise InputError(f"{table.where}: {_no_taxels(table, rest)}")
+
+
+def _no_taxels(table: Table, names: Sequence[str]) -> str:
+    """What to type where no columns are named as taxels."""
+    three = ", or --axes xyz for taxels of three axes" * any(map(lettered, names))
     numbers = table.data.select_dtypes("number").columns
-    names = [name for name in rest if name in numbers] or rest
-    if any(set(",;- ") & set(name) for name in names):
-        every = list(table.file_names) or table.names
-        names = [str(every.index(name) + 1) for name in names]
-    raise InputError(
-        f"{table.where}: no columns are named as taxels, such as s1 to s16 without a gap; "
-        f"give --taxels {','.join(names)}{three}, without what is no taxel"
+    terms = [name for name in names if name in numbers] or list(names)
+    if set(",;- ") & set("".join(terms)):
+        columns = list(table.file_names) or table.names
+        terms = [str(columns.index(name) + 1) for name in terms]
+    return (
+        "no columns are named as taxels, such as s1 to s16 without a gap; give --taxels "
+        f"{','.join(terms)}{three}, without what is no taxel"
     )
 
 
@@ -295,9 +300,9 @@ def _unit(
     """The unit of times, and how it is known."""
     if time is None:
         return "s", "by --rate"
-    name = TIME.fullmatch(time)
-    stated = table.units.get(time) or (name and (name["unit"] or name["alone"]))
-    unit = options.time_unit or UNITS.get((stated or "").lower())
+    match = TIME.fullmatch(time)
+    words = filter(None, [table.units.get(time), *(match.groups() if match else [])])
+    unit = options.time_unit or UNITS.get(next(words, "").lower())
     if unit == "iso" or (unit is None and is_date(table, time)):
         return "iso", "times of the day"
     return (unit, "as said") if unit else _likely_unit(table, time)
