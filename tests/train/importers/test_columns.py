@@ -41,7 +41,7 @@ def test_taxels_with_a_row_and_a_column_tell_the_shape(form):
 @pytest.mark.parametrize(
     ("names", "sentence"),
     [
-        (("p1", "p2", "p4", "f"), "--taxels p1,p2,p4,f"),
+        (("p1", "p2", "p4", "f"), "--taxels p1-f"),
         (("taxel_1", "taxel_2", "tactile1", "tactile2"), 'are the taxels "taxel_1"'),
     ],
 )
