@@ -264,12 +264,8 @@ demo-data: $(READY)
 		--features paper --projection pca --tasks category mobility object --name demo
 	PYTHONPATH=. $(BIN)/python tests/board/demo_data.py $(DEMODATA)
 
-$(VENV)/.mutants: $(DEV)
-	@$(call INSTALL,--group mutants)
-	@touch $@
-
 # The lines that differ are missing pins (<) and pins that nothing needs (>).
-GROUPS := train cluster dev docs browser mutants bench upkeep
+GROUPS := train cluster dev docs browser bench upkeep
 constraints: $(VENV)/.upkeep
 	$(COMPILE) --no-header --python-version 3.11.9 --python-platform x86_64-manylinux_2_28 \
 	  --all-extras $(GROUPS:%=--group %) -o $(VENV)/constraints.txt
@@ -284,7 +280,6 @@ CHECKS := accuracy faults flags fuzz hard-cases kills mutants remount risk scale
 ONLY ?= $(filter-out remount test-busy,$(CHECKS))
 
 flags transfer: $(BENCHVENV)
-mutants: $(VENV)/.mutants
 accuracy: $(PEERS)/.ready
 
 $(CHECKS): $(DEV)
@@ -298,4 +293,4 @@ check: $(DEV)
 	done; exit $$failed
 
 clean:
-	rm -rf build dist mutants
+	rm -rf build dist

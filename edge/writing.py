@@ -7,7 +7,7 @@ import os
 import tempfile
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 from typing import IO, BinaryIO
 
@@ -16,6 +16,9 @@ from edge.files import refusing
 
 PREFIX = ".edge-classify-temporary-"
 """Begins the name of a file that is being written."""
+LOOK_S = 0.02
+LOOKS = 250
+"""How often to look whether another program has ended."""
 YOUNG_S = 2.0
 """A file this young may not have been locked yet."""
 
@@ -32,6 +35,38 @@ def lock(file: IO[bytes] | int) -> None:
         import fcntl
 
         fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+
+
+@contextmanager
+def alone(folder: Path, activity: str) -> Iterator[None]:
+    """Let no other program write into a folder during the block; temporary files of
+    dead runs are removed from it.
+
+    Args:
+        folder: which need not exist.
+        activity: of all who take it alone, for the sentence, such as `changes labels`.
+
+    Raises:
+        InputError: another program takes long.
+    """
+    with ExitStack() as stack:
+        # Windows opens no folder, and some file systems have no locks; what else fails,
+        # fails again where a file is written.
+        with suppress(OSError):
+            handle = os.open(folder, os.O_RDONLY)
+            stack.callback(os.close, handle)
+            _wait(handle, f"{folder}: another program {activity} here")
+        remove_leftovers(folder)
+        yield
+
+
+def _wait(handle: int, problem: str) -> None:
+    """Wait for other programs, and lock a folder until it is closed."""
+    for _ in range(LOOKS):
+        with suppress(BlockingIOError):
+            return lock(handle)
+        time.sleep(LOOK_S)
+    raise InputError(f"{problem}; try again when it has ended")
 
 
 def remove_leftovers(folder: str | os.PathLike[str]) -> None:

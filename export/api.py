@@ -79,8 +79,9 @@ def describe(fitted: Fitted, name: str | None = None) -> ModelInfo:
         name: of the model; that of the recordings' folder where None.
     """
     dataset = fitted.dataset
-    folder, trials = names(dataset)
-    packages = ("numpy", "scikit-learn", "skl2onnx", "onnx")
+    folder, all_trials = names(dataset)
+    trials = tuple(all_trials[trial] for trial in fitted.classifier.trials_)
+    packages = ("numpy", "scikit-learn", "onnx")
     return ModelInfo(
         tasks={task: _task(fitted, task) for task in fitted.classifier.choices},
         layout=dataset.layout,
@@ -93,7 +94,7 @@ def describe(fitted: Fitted, name: str | None = None) -> ModelInfo:
         chain=dataset.chain,
         joints=dataset.joints,
         kernels=dataset.kernels,
-        rows=len(dataset.trials),
+        rows=len(trials),
         data_digest=dataset.digest,
         versions={
             "edge-classify": __version__,

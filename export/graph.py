@@ -1,5 +1,4 @@
-"""A fitted `ContactClassifier` as one ONNX graph, through skl2onnx with our own
-converter.
+"""A fitted model as one ONNX graph, through skl2onnx with our own converter.
 
 skl2onnx's own k-NN walks the training rows in a Scan, which is slow, breaks ties by the
 class number and answers NaN with the first row's label. This graph takes all distances
@@ -10,9 +9,9 @@ finite with label -1.
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from functools import partial, reduce
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 import onnx
@@ -32,12 +31,21 @@ from train.model.novelty import (
     NoveltyPoint,
     NoveltySpace,
 )
-from train.model.pipeline import ContactClassifier, FittedSpace, nearest_of_label
+from train.model.pipeline import ContactClassifier, FittedSpace
 from train.model.stopping import SequentialClassifier
 
 IR_VERSION = 8
 LARGEST = float(np.finfo(np.float64).max)
-Fitted = ContactClassifier | SequentialClassifier
+
+
+class FittedScorer(Protocol):
+    """What was fitted by another module than those of `train.model` that stand here."""
+
+    def add_nodes(self, build: Builder) -> None:
+        """Add the nodes from `features` to all outputs of the model's metadata."""
+
+
+Fitted = ContactClassifier | SequentialClassifier | FittedScorer
 
 
 def _squares(
@@ -138,10 +146,13 @@ def _vote(
         build.node("GatherND", voters, winner, output=label, batch_dims=1)
 
 
-def _build(model: Fitted) -> Builder:
-    """The nodes from `features` and, with decision points, `decision_point` to all
+def _nearest_trials(
+    build: Builder,
+    model: ContactClassifier | SequentialClassifier,
+    has_label_distances: bool,
+) -> None:
+    """Nodes from `features` and, with decision points, `decision_point` to all
     outputs."""
-    build = Builder()
     points: Sequence[ContactClassifier]
     if isinstance(model, SequentialClassifier):
         points = model.decision_points_
@@ -175,8 +186,7 @@ def _build(model: Fitted) -> Builder:
     for task in model.choices:
         unit = build.node("Gather", units, f"space of {task}", axis=0)
         of_task = (*projected[_spaces(points, task)], unit)
-        _task(build, points, task, of_task, _has_label_distances(model))
-    return build
+        _task(build, points, task, of_task, has_label_distances)
 
 
 Spaces = tuple[FittedSpace, ...]
@@ -205,16 +215,16 @@ def _task(
             coordinates' unit.
         has_label_distances: whether something goes by them.
     """
-    trials = points[-1].n_trials_
+    count = points[-1].n_rows_
     at_points = [point.tasks_[task] for point in points]
     last = at_points[-1]
     members = last.space.members
     rows = []
     for fitted in at_points:
-        of_all = np.zeros((trials, fitted.space.rows.shape[1]))
+        of_all = np.zeros((count, fitted.space.rows.shape[1]))
         of_all[members] = fitted.space.rows / fitted.unit
         rows.append(of_all)
-    labels = np.full(trials, -1)
+    labels = np.full(count, -1)
     labels[members] = last.labels
     components = [point.choices[task].components for point in points]
     z, off, unit = projected
@@ -227,7 +237,7 @@ def _task(
     _vote(build, task, labels, len(last.classes), neighbours, last.k, off)
     if has_label_distances:
         scales = [fitted.unit * fitted.slope for fitted in at_points]
-        _label_distances(build, task, squares, labels, scales)
+        _label_distances(build, task, squares, labels, last.counts, scales)
 
 
 def _doubt(build: Builder, space: NoveltySpace) -> None:
@@ -297,6 +307,7 @@ def _label_distances(
     task: str,
     squares: str,
     labels: Integers,
+    counts: Integers,
     scales: Sequence[float],
 ) -> None:
     """Nodes for `train.model.pipeline.label_distances` (n, labels).
@@ -304,13 +315,13 @@ def _label_distances(
     Args:
         build: takes the nodes.
         task: its name.
-        squares: name of the squared distances (n, rows) to trials.
-        labels: (rows,) of the trials; -1 where one has none.
+        squares: name of the squared distances (n, rows).
+        labels: (rows,) of the rows; -1 where one has none.
+        counts: (labels,) rows that stand for each.
         scales: of the distances at each decision point.
     """
     sizes = np.bincount(labels[labels >= 0])
-    counts = nearest_of_label(sizes)
-    # The trials of each label, filled up with a row that is infinitely far.
+    # The rows of each label, filled up with a row that is infinitely far.
     members = np.full((len(sizes), int(sizes.max())), len(labels))
     for label, size in enumerate(sizes):
         members[label, :size] = np.flatnonzero(labels == label)
@@ -332,47 +343,38 @@ def _label_distances(
     build.node("Mul", distances, factors, output=f"{task}_label_distances")
 
 
-def _has_label_distances(model: Fitted) -> bool:
-    """Whether something goes by the distances of a task's labels."""
-    return isinstance(model, SequentialClassifier) or bool(model.products_)
+class _Converter:
+    """What skl2onnx asks of a converter, for the outputs of a model's metadata."""
 
+    def __init__(self, info: ModelInfo) -> None:
+        self._info = info
 
-def _outputs(model: Fitted) -> Iterator[tuple[str, Any]]:
-    """Names and types; ONNX Runtime derives the sizes from the constants."""
-    numbers = DoubleTensorType([None])
-    table = DoubleTensorType([None, None])
-    for task in model.choices:
-        yield f"{task}_label", Int64TensorType([None])
-        yield f"{task}_scores", table
-        yield f"{task}_distances", table
-        yield f"{task}_neighbours", Int64TensorType([None, None])
-        if _has_label_distances(model):
-            yield f"{task}_label_distances", table
-    yield "out_of_range", numbers
-    if isinstance(model, SequentialClassifier):
-        yield "novelty", numbers
-        yield "remoteness", numbers
+    def parse(
+        self, scope: Any, model: Fitted, inputs: list[Any], custom_parsers: Any = None
+    ) -> Any:
+        """Declare the outputs; ONNX Runtime derives their sizes from the constants."""
+        operator = scope.declare_local_operator(type(model).__name__, model)
+        operator.inputs.extend(inputs)
+        for name, (element, shape) in self._info.outputs.items():
+            kind = Int64TensorType if element == "int64" else DoubleTensorType
+            variable = scope.declare_local_variable(name, kind([None, *shape]))
+            operator.outputs.append(variable)
+        return operator.outputs
 
+    def shapes(self, operator: Any) -> None:
+        """Keep the types with which `parse` declares the outputs."""
 
-def _parse(
-    scope: Any, model: Fitted, inputs: list[Any], custom_parsers: Any = None
-) -> Any:
-    operator = scope.declare_local_operator(type(model).__name__, model)
-    operator.inputs.extend(inputs)
-    for name, kind in _outputs(model):
-        operator.outputs.append(scope.declare_local_variable(name, kind))
-    return operator.outputs
-
-
-def _shapes(operator: Any) -> None:
-    """Keep the types with which `_parse` declares the outputs."""
-
-
-def _convert(scope: Any, operator: Any, container: Any) -> None:
-    build = _build(operator.raw_operator)
-    container.nodes.extend(build.made)
-    container.initializers.extend(build.constants.values())
-    container.node_domain_version_pair_sets.add(("", OPSET))
+    def convert(self, scope: Any, operator: Any, container: Any) -> None:
+        """Add the nodes and constants."""
+        build = Builder()
+        model = operator.raw_operator
+        if isinstance(model, ContactClassifier | SequentialClassifier):
+            _nearest_trials(build, model, self._info.has_label_distances)
+        else:
+            model.add_nodes(build)
+        container.nodes.extend(build.made)
+        container.initializers.extend(build.constants.values())
+        container.node_domain_version_pair_sets.add(("", OPSET))
 
 
 def to_onnx(model: Fitted, info: ModelInfo) -> bytes:
@@ -382,13 +384,19 @@ def to_onnx(model: Fitted, info: ModelInfo) -> bytes:
     default is the last one, and for each task the output `<task>_label_distances` (n,
     labels); see `edge.decide.info`.
     """
-    kind = type(model)
-    update_registered_converter(
-        kind, kind.__name__, _shapes, _convert, parser=_parse, overwrite=True
-    )
     inputs: list[tuple[str, Any]] = [("features", DoubleTensorType([None, info.width]))]
-    if isinstance(model, SequentialClassifier):
+    if info.decision_points_s:
         inputs.append(("decision_point", Int64TensorType([1])))
+    kind = type(model)
+    converter = _Converter(info)
+    update_registered_converter(
+        kind,
+        kind.__name__,
+        converter.shapes,
+        converter.convert,
+        parser=converter.parse,
+        overwrite=True,
+    )
     proto = convert_sklearn(
         model, name="edge-classify", initial_types=inputs, target_opset={"": OPSET}
     )

@@ -116,7 +116,7 @@ def _task_warnings(fitted: Fitted, task: str) -> Iterator[str]:
             f"{choice.components - components} fewer than asked for"
         )
     rows = fitted_task.rows
-    members = fitted_task.space.members
+    members = fitted_task.space.trials
     _, different = np.unique(fitted.X[members], axis=0, return_index=True)
     steps = coarseness(rows[different], fitted_task.unit)
     if rows.any() and steps < FEWEST_UNITS:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import math
 import signal
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, ExitStack, contextmanager, nullcontext
@@ -85,6 +86,7 @@ def open_skin(
     calibrated: bool = True,
     model: Model | None = None,
     joint_names: Sequence[str] | None = None,
+    real_time: bool = False,
 ) -> Iterator[Opened]:
     """The skin that the options name, closed at the end of the block.
 
@@ -94,20 +96,21 @@ def open_skin(
         model: its contact threshold is used if it is lower than the skin's.
         joint_names: the joint angles that a recording must have; they are put into
             this order.
+        real_time: play a recording at its original speed.
 
     Raises:
         InputError: the options or the skin's file cannot be used.
         EdgeError: the skin cannot be read.
     """
     if arguments.fake is not None:
-        opened = _played(arguments, joint_names)
-    elif arguments.loop or arguments.real_time:
-        raise InputError("--loop and --real-time work only with --fake REC.npz")
+        opened = _played(arguments, joint_names, real_time)
+    elif arguments.loop:
+        raise InputError("--loop works only with --fake REC.npz")
     elif arguments.skin is None:
         raise InputError("give --skin skin.toml, or --fake REC.npz to use no hardware")
     else:
         skin = Skin.open(arguments.skin, calibrated=calibrated)
-        opened = Opened(skin, arguments.seconds, arguments.skin)
+        opened = Opened(skin, math.inf, arguments.skin)
     with opened.skin as skin:
         if model is not None:
             threshold_counts = for_device(
@@ -120,7 +123,9 @@ def open_skin(
         yield opened
 
 
-def _played(arguments: argparse.Namespace, joint_names: Sequence[str] | None) -> Opened:
+def _played(
+    arguments: argparse.Namespace, joint_names: Sequence[str] | None, real_time: bool
+) -> Opened:
     """The recording of --fake, played onto fake chips."""
     from edge.wire.fake.player import play_file  # a robot has a skin
 
@@ -129,17 +134,15 @@ def _played(arguments: argparse.Namespace, joint_names: Sequence[str] | None) ->
         arguments.fake,
         file,
         joint_names=joint_names,
-        noise_counts=arguments.noise,
         loop=arguments.loop,
-        real_time=arguments.real_time,
+        real_time=real_time,
     )
-    lasts_s = min(playback.ends, arguments.seconds)
     name = f"fake {arguments.fake}"
-    return Opened(skin, lasts_s, name, playback, virtual=not arguments.real_time)
+    return Opened(skin, playback.ends, name, playback, virtual=not real_time)
 
 
 @dataclass(frozen=True)
-class Reading:
+class Live:
     """A skin that is being read, with its loop, page and output.
 
     Attributes:
@@ -203,7 +206,7 @@ def reading(
     needs_joints: bool = True,
     real_time: bool = False,
     **page: Any,
-) -> Iterator[Reading]:
+) -> Iterator[Live]:
     """Read the skin that the options name, until a signal comes.
 
     Args:
@@ -211,8 +214,7 @@ def reading(
         model: decides on the contacts; its arm and its angles are wanted, if no others.
         arm: whose angles are wanted.
         needs_joints: refuse a source without the angles that the model needs.
-        real_time: play a recording at its original speed, whatever the options say, as
-            a page always does.
+        real_time: play a recording at its original speed, as with a page.
         page: further arguments of `edge.app.sinks.page.Page`.
 
     Raises:
@@ -227,11 +229,12 @@ def reading(
     if arm is not None:
         names = arm.names
         dof = arm.dof
-    if arguments.fake is not None:
-        arguments.real_time |= real_time or arguments.web is not None
+    real_time |= arguments.web is not None
     played_names = names if arguments.joints is None else None
     with ExitStack() as stack:
-        opening = open_skin(arguments, model=model, joint_names=played_names)
+        opening = open_skin(
+            arguments, model=model, joint_names=played_names, real_time=real_time
+        )
         opened = stack.enter_context(opening)
         # Before this point a signal ends the program at once, as nothing can be lost.
         stop = stack.enter_context(stop_on(*ending_signals()))
@@ -242,11 +245,11 @@ def reading(
             opened.skin,
             joints=joints,
             onsets=_onsets(model, joints, opened),
-            lasts_s=opened.lasts_s,
+            lasts_s=min(opened.lasts_s, arguments.seconds),
             stop=stop,
         )
         live = stack.enter_context(_page(arguments.web, opened, loop, page))
-        yield Reading(opened, loop, stop, live, Output.of(arguments))
+        yield Live(opened, loop, stop, live, Output.of(arguments))
 
 
 def _page(

@@ -1,41 +1,67 @@
-"""The programs that can run a model: ONNX Runtime, or numpy where that is missing."""
+"""The programs that score a vector by a model: ONNX Runtime, or numpy where that is
+missing."""
 
 from __future__ import annotations
 
 import logging
-from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from importlib import import_module
+from typing import Any, Protocol
 
+import numpy as np
+
+from edge.arrays import Array, Floats
+from edge.decide.info import ModelInfo
 from edge.decide.onnx_file import Contents
 from edge.errors import EdgeError, InputError
-from edge.files import parsing
 from edge.interrupt import delayed
-
-if TYPE_CHECKING:
-    from edge.decide.graph import Graph
 
 LOG = logging.getLogger("edge.decide")
 ENGINES = ("onnxruntime", "numpy")
+SCORERS = {"knn": "edge.decide.knn.NearestTrials"}
+"""{scorer of a model's metadata: its class in numpy}, which takes the constants and the
+metadata of a file."""
+
+
+class Scorer(Protocol):
+    """Takes vectors and a decision point to the distances of each task's labels.
+
+    Attributes:
+        name: one of `ENGINES`.
+    """
+
+    name: str
+
+    def score(self, vectors: Floats, point: int) -> dict[str, Array]:
+        """{output: its value}, see `edge.decide.info.ModelInfo.outputs`, for vectors
+        (n, width) of a decision point; exceptions of many kinds where the file is
+        damaged."""
 
 
 def open_engine(
     path: str,
     contents: Contents,
+    info: ModelInfo,
     engine: str | None,
-) -> OnnxRuntime | Graph:
-    """The engine of a model.
+) -> Scorer:
+    """What scores vectors by a model.
 
     Args:
         path: of the model's file, for errors.
         contents: of the file.
+        info: its metadata.
         engine: one of `ENGINES`; None for ONNX Runtime, or numpy where it is missing.
 
     Raises:
-        InputError: the engine does not exist, or refuses the file.
+        InputError: the engine or the model's scorer does not exist, or it refuses the
+            file.
         EdgeError: ONNX Runtime is asked for and cannot be imported.
     """
     if engine not in (None, *ENGINES):
         raise InputError(f"there is no engine {engine!r}; give {' or '.join(ENGINES)}")
+    if info.scorer not in SCORERS:
+        raise InputError(
+            f"{path}: is scored by {info.scorer!r}, which this edge-classify lacks"
+        )
     if engine != "numpy":
         try:
             with delayed():
@@ -50,27 +76,21 @@ def open_engine(
                 "cannot be imported"
             )
         else:
-            return OnnxRuntime(path, contents, onnxruntime)
-    from edge.decide.graph import Graph  # most boards have ONNX Runtime
-
-    with parsing(path, "an ONNX model", "; copy or export it again"):
-        return Graph(contents)
+            return OnnxRuntime(path, contents, info, onnxruntime)
+    # Most boards have ONNX Runtime.
+    module, _, name = SCORERS[info.scorer].rpartition(".")
+    scorer: Scorer = getattr(import_module(module), name)(contents.constants, info)
+    return scorer
 
 
 class OnnxRuntime:
-    """ONNX Runtime with one thread; `edge.decide.graph.Graph` has the same attributes.
-
-    Attributes:
-        name: one of `ENGINES`.
-        run: gives the outputs of a list of names for {input: its value}; it raises
-            exceptions of many kinds where the graph cannot be computed.
-        inputs: {input: its type and shape}; a size that is not known is no number.
-        outputs: {output: its type and shape}.
-    """
+    """ONNX Runtime with one thread."""
 
     name = "onnxruntime"
 
-    def __init__(self, path: str, contents: Contents, runtime: Any) -> None:
+    def __init__(
+        self, path: str, contents: Contents, info: ModelInfo, runtime: Any
+    ) -> None:
         """Load the file.
 
         Raises:
@@ -87,7 +107,7 @@ class OnnxRuntime:
         options.graph_optimization_level = level
         options.enable_cpu_mem_arena = False
         try:
-            session = runtime.InferenceSession(
+            self._session = runtime.InferenceSession(
                 contents.data,
                 options,
                 providers=["CPUExecutionProvider"],
@@ -98,12 +118,13 @@ class OnnxRuntime:
                 f"{path}: ONNX Runtime refuses it ({type(error).__name__}); export it "
                 "again"
             ) from None
-        self.run = session.run
-        self.inputs = _declared(
-            [*session.get_inputs(), *session.get_overridable_initializers()]
-        )
-        self.outputs = _declared(session.get_outputs())
+        self._outputs = list(info.outputs)
+        self._has_points = bool(info.decision_points_s)
 
-
-def _declared(values: Sequence[Any]) -> dict[str, tuple[str, list[Any]]]:
-    return {value.name: (value.type, value.shape) for value in values}
+    def score(self, vectors: Floats, point: int) -> dict[str, Array]:
+        """As `Scorer.score`."""
+        inputs: dict[str, Array] = {"features": vectors}
+        if self._has_points:
+            inputs["decision_point"] = np.array([point], dtype=np.int64)
+        values = self._session.run(self._outputs, inputs)
+        return dict(zip(self._outputs, values, strict=True))

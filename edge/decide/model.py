@@ -12,12 +12,14 @@ from edge.arrays import Array, Floats, Integers
 from edge.decide import onnx_file
 from edge.decide.agreement import agreed
 from edge.decide.engines import open_engine
-from edge.decide.info import METADATA_KEY, ModelInfo
+from edge.decide.info import METADATA_KEY
 from edge.decide.metadata_reader import from_json
 from edge.errors import InputError, OutOfRange, printable
 from edge.files import read_bytes
 
 LARGEST_BYTES = 1 << 30
+NONE: Any = np.zeros(0)
+"""Of neighbours, where the model's scorer has none."""
 
 
 class Decision(NamedTuple):
@@ -39,7 +41,8 @@ class Decision(NamedTuple):
         scores: (labels,) share of the votes of each label.
         distances: (k,) of the neighbours, nearest first, in the space of the
             projection.
-        neighbours: (k,) rows of the training set, nearest first.
+        neighbours: (k,) rows of the training set, nearest first. Both are empty where
+            the model's scorer is another than k-NN.
         tie: another label had as many votes; the nearest of the tied won.
         label_distances: (labels,) how far the nearest training trials of each label lie
             (`train.model.pipeline.nearest_of_label` says how many), in log odds, of a
@@ -83,7 +86,6 @@ class Model:
         info: its metadata.
         version: the first eight digits of the file's SHA-256.
         engine: the program that runs the graph, one of `edge.decide.engines.ENGINES`.
-        outputs: {output of the graph: its type, and its shape for one vector}.
 
     Raises:
         InputError: the file is missing, is not an exported model, or contradicts
@@ -114,34 +116,10 @@ class Model:
         # number.
         self.info = from_json(text, name)
         onnx_file.check(self.contents, name)
-        self.outputs = _outputs(self.info)
-        self._engine = open_engine(name, self.contents, engine)
-        self.engine = self._engine.name
-        self._check()
-
-    def _check(self) -> None:
-        """Refuse a graph whose inputs and outputs are not those of its metadata."""
-        expected = {"features": ("tensor(double)", [self.info.width]), **self.outputs}
-        if self.info.decision_points_s:
-            expected["decision_point"] = "tensor(int64)", []
-        declared = {**self._engine.inputs, **self._engine.outputs}
-        for name, (kind, shape) in expected.items():
-            declared_kind, sizes = declared.get(name, (None, []))
-            # Older versions of ONNX Runtime leave some sizes open; `run` checks these.
-            sizes_known = [
-                size if isinstance(size, int) else None for size in sizes[1:]
-            ]
-            if declared_kind != kind or sizes_known not in (shape, [None] * len(shape)):
-                raise InputError(
-                    f"{self.path}: its graph has no {kind} {name} of shape {shape}, "
-                    "which its metadata describes; export it again"
-                )
-        for name in self._engine.inputs:
-            if name not in expected:
-                raise InputError(
-                    f"{self.path}: has an input {name}, which no exported model has; "
-                    "export it again"
-                )
+        self._scorer = open_engine(name, self.contents, self.info, engine)
+        self.engine = self._scorer.name
+        # A graph that is not that of its metadata is refused at once.
+        self.run(np.zeros((1, self.info.width)))
 
     @property
     def named(self) -> str | None:
@@ -168,7 +146,7 @@ class Model:
     @property
     def decision_points_s(self) -> tuple[float, ...]:
         """Windows for which the model can decide; uncalibrated, only the full one."""
-        return self.info.decision_points_s or (self.info.window_s,)
+        return self.info.points_s
 
     def run(
         self,
@@ -190,18 +168,15 @@ class Model:
             raise InputError(
                 f"{self.path}: has the decision points 0 to {last}, not {point}"
             )
-        inputs: dict[str, Array] = {"features": vectors}
-        if self.info.decision_points_s:
-            inputs["decision_point"] = np.array([point], dtype=np.int64)
         try:
-            values = self._engine.run(list(self.outputs), inputs)
-        # An index past its tensor, or shapes that do not match.
+            outputs = self._scorer.score(vectors, point)
+        # An index past its tensor, shapes that do not match, or a constant that lacks.
         except Exception as error:
-            raise self._broken(printable(str(error))) from None
-        outputs = dict(zip(self.outputs, values, strict=True))
-        for name, (_, shape) in self.outputs.items():
-            if outputs[name].shape != (len(vectors), *shape):
-                raise self._broken(f"{name} has the shape {outputs[name].shape}")
+            raise self._broken(printable(f"{type(error).__name__}: {error}")) from None
+        for name, (kind, shape) in self.info.outputs.items():
+            value = outputs[name]
+            if value.dtype != kind or value.shape != (len(vectors), *shape):
+                raise self._broken(f"{name} is {value.dtype} {value.shape}")
         return outputs
 
     def decide(
@@ -261,7 +236,7 @@ class Model:
             point: index of the decision point that was asked for.
             label: index of the label in which the tasks agree.
             distances: (labels,) of the nearest answers with each label, if any.
-            answers: {output of the graph: its value}.
+            answers: {output: its value}.
 
         Raises:
             InputError: the label is none of the task's, or its votes are no share.
@@ -286,8 +261,8 @@ class Model:
             confidence=confidence,
             votes=shares[label],
             scores=scores,
-            distances=answers[f"{task}_distances"],
-            neighbours=answers[f"{task}_neighbours"],
+            distances=answers.get(f"{task}_distances", NONE),
+            neighbours=answers.get(f"{task}_neighbours", NONE),
             tie=shares.count(max(shares)) > 1,
             label_distances=distances,
             out_of_range=bool(answers["out_of_range"] > 0.0),
@@ -313,22 +288,3 @@ class Model:
         place = finite.argmin()
         feature = np.repeat(self.info.features, self.info.widths)[place]
         return OutOfRange(f"value {place} of the features, of {feature}, is not finite")
-
-
-def _outputs(info: ModelInfo) -> dict[str, tuple[str, list[int]]]:
-    """{output: its type, and its shape for one vector} of a graph with this
-    metadata."""
-    scores = ["out_of_range"]
-    if info.decision_points_s:
-        scores += ["novelty", "remoteness"]
-    outputs = dict.fromkeys(scores, ("tensor(double)", list[int]()))
-    for task, entry in info.tasks.items():
-        outputs |= {
-            f"{task}_label": ("tensor(int64)", []),
-            f"{task}_scores": ("tensor(double)", [len(entry.labels)]),
-            f"{task}_distances": ("tensor(double)", [entry.k]),
-            f"{task}_neighbours": ("tensor(int64)", [entry.k]),
-        }
-        if info.has_label_distances:
-            outputs[f"{task}_label_distances"] = "tensor(double)", [len(entry.labels)]
-    return outputs

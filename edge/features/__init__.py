@@ -1,1 +1,1 @@
-"""What is measured of a contact: quantities, and the vector that they make."""
+"""The measurements of a contact: quantities, and the vector that they make."""

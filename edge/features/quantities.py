@@ -41,7 +41,7 @@ def none(_: SkinLayout) -> float:
 
 @dataclass(frozen=True)
 class Quantity:
-    """What is measured in every frame of a contact.
+    """A quantity that every frame of a contact has.
 
     Attributes:
         name: of a quantity of every zone, it follows the zone's name in a feature's.
@@ -55,7 +55,7 @@ class Quantity:
         zones: whose sums it needs besides the region's own peak and area; empty where
             these are of its own zone alone.
         signed: it may be negative, and so has no logarithm.
-        floor: what is added before its logarithm is taken.
+        floor: added before its logarithm is taken.
         motion: the motion in `FeatureSeries` that it needs, if any.
         cells: those of a skin that it has a value of each of, if any.
         kernels: how many values kernels make of it, see `edge.features.kernels`.

@@ -1,13 +1,11 @@
 """Changes of labels: a new table takes the former one's place in one step.
 
-Recordings stay as they are. Former tables are kept, so that a change can be taken back.
+Recordings stay as they are. The former table is kept, so that the last change can be taken back.
 """
 
 import hashlib
 import os
-import time
-from collections.abc import Iterator, Mapping
-from contextlib import ExitStack, contextmanager, suppress
+from collections.abc import Mapping
 from dataclasses import replace
 from datetime import UTC, datetime
 from pathlib import Path
@@ -17,16 +15,13 @@ from edge.errors import InputError, printable
 from edge.files import parsing, read_bytes
 from edge.record.labels import FILE, LEFT_OUT, TABLE, Row, Standing, Table, read_table
 from edge.record.recording import read_meta
-from edge.writing import lock, remove_leftovers, write_whole
+from edge.writing import alone, write_whole
 
-FORMER = ".edge-classify-former-labels"
-"""The folder of the former tables of a folder."""
-MOST_FORMER = 10
+FORMER = ".edge-classify-former-labels.csv"
+"""The former table of a folder."""
 NO_ROWS = f"{FILE},{LEFT_OUT}\n".encode()
 """The former table where there was none."""
-LOOK_S = 0.02
-LOOKS = 250
-"""How often to look whether another program has ended."""
+CHANGES = "changes labels"
 
 
 class Change(NamedTuple):
@@ -37,7 +32,7 @@ class Change(NamedTuple):
 
 
 class Former(NamedTuple):
-    """A former table: the change that took its place (when, by which command, and the
+    """The former table: the change that took its place (when, by which command, and the
     digest of the new table), and what it held."""
 
     path: Path
@@ -45,36 +40,6 @@ class Former(NamedTuple):
     time: str
     command: str
     contents: bytes
-
-
-@contextmanager
-def alone(folder: Path) -> Iterator[None]:
-    """Let no other program change the folder's table during the block.
-
-    Raises:
-        InputError: another program takes long.
-    """
-    with ExitStack() as stack:
-        # Windows opens no folder, and some file systems have no locks; what else fails,
-        # fails again where the table is written.
-        with suppress(OSError):
-            handle = os.open(folder, os.O_RDONLY)
-            stack.callback(os.close, handle)
-            _lock(handle, folder)
-        remove_leftovers(folder)
-        remove_leftovers(folder / FORMER)
-        yield
-
-
-def _lock(handle: int, folder: Path) -> None:
-    """Wait for other programs, and lock a folder until it is closed."""
-    for _ in range(LOOKS):
-        with suppress(BlockingIOError):
-            return lock(handle)
-        time.sleep(LOOK_S)
-    raise InputError(
-        f"{folder}: another program is changing labels here; try again when it has ended"
-    )
 
 
 def now() -> str:
@@ -97,7 +62,7 @@ def change(
         InputError: a recording does not stand any more as the person saw it, or the
             table cannot be written; nothing has changed then.
     """
-    with alone(folder):
+    with alone(folder, CHANGES):
         table = read_table(folder)
         after = {}
         for file, (before, (labels, left_out)) in changes.items():
@@ -110,17 +75,19 @@ def change(
             after[file] = Standing(cells, left_out)
             replace(table, rows={file: Row(cells, left_out, 0)}).standing(file, meta)
         contents = table.encoded({**_filled(table, after), **after})
-        _keep(folder, table, contents, f"{when} {command}")
+        head = f"# {hashlib.sha256(contents).hexdigest()} {when} {printable(command)}\n"
+        _write(folder / FORMER, head.encode() + (table.contents or NO_ROWS))
         _write(table.path, contents)
         return read_table(folder)
 
 
 def _newer(folder: Path, standing: Standing) -> str:
     """How a recording stands since another person's change, and by which."""
-    by = [f" by `{former.command}` at {former.time}" for former in formers(folder)]
+    last = former(folder)
+    by = "" if last is None else f" by `{last.command}` at {last.time}"
     out = " and left out" if standing.left_out else ""
     return (
-        f"has been changed{''.join(by[-1:])} since you looked, to "
+        f"has been changed{by} since you looked, to "
         f"{standing.labels or 'no label'}{out}; nothing was written: look again"
     )
 
@@ -144,57 +111,45 @@ def _write(path: Path, contents: bytes) -> None:
         file.write(contents)
 
 
-def _keep(folder: Path, table: Table, contents: bytes, by: str) -> None:
-    """Keep the table that another one is going to replace, and nine before it."""
-    kept = [former.path for former in formers(folder)]
-    # That of a change that did not come to be is written anew.
-    number = int(kept[-1].stem) + 1 if kept else 1
-    head = f"# {hashlib.sha256(contents).hexdigest()} {printable(by)}\n"
-    former = table.contents or NO_ROWS
-    _write(folder / FORMER / f"{number:06}.csv", head.encode() + former)
-    for path in kept[: 1 - MOST_FORMER]:
-        path.unlink(missing_ok=True)
-
-
-def formers(folder: Path) -> list[Former]:
-    """The former tables of a folder, the latest last; without those whose change did not
-    come to be, or has been taken back.
+def former(folder: Path) -> Former | None:
+    """The former table of a folder; None where the last change did not come to be, or
+    has been taken back.
 
     Raises:
-        InputError: one is damaged.
+        InputError: it is damaged.
     """
-    tables = []
-    for path in sorted((folder / FORMER).glob("[0-9]*.csv")):
-        head, _, contents = read_bytes(path).partition(b"\n")
-        with parsing(str(path), "a former table of labels", "; delete it"):
-            _, digest, when, command = head.decode().split(" ", 3)
-        tables.append(Former(path, digest, when, command, contents))
-    while tables and tables[-1].contents == (_contents(folder) or NO_ROWS):
-        tables.pop()
-    return tables
+    path = folder / FORMER
+    if not path.is_file():
+        return None
+    head, _, contents = read_bytes(path).partition(b"\n")
+    with parsing(str(path), "a former table of labels", "; delete it"):
+        _, digest, when, command = head.decode().split(" ", 3)
+    if contents == (_contents(folder) or NO_ROWS):
+        return None
+    return Former(path, digest, when, command, contents)
+
+
+def undo(last: Former) -> Path:
+    """Bring the former table of a folder back; the folder.
+
+    Raises:
+        InputError: the table has been changed since.
+    """
+    folder = last.path.parent
+    with alone(folder, CHANGES):
+        if former(folder) != last:
+            raise InputError(f"{folder}: labels have been changed since; look again")
+        if hashlib.sha256(_contents(folder)).hexdigest() != last.digest:
+            raise InputError(
+                f"{folder / TABLE}: has been written since by another program, such as a "
+                f"spreadsheet; {last.path} is the table before"
+            )
+        _write(folder / TABLE, last.contents)
+        last.path.unlink(missing_ok=True)
+    return folder
 
 
 def _contents(folder: Path) -> bytes:
     """What a folder's table holds; nothing without one."""
     path = folder / TABLE
     return read_bytes(path) if os.path.lexists(path) else b""
-
-
-def undo(former: Former) -> Path:
-    """Bring a former table back, which must be the last of its folder; the folder.
-
-    Raises:
-        InputError: the table has been changed since.
-    """
-    folder = former.path.parents[1]
-    with alone(folder):
-        if formers(folder)[-1:] != [former]:
-            raise InputError(f"{folder}: labels have been changed since; look again")
-        if hashlib.sha256(_contents(folder)).hexdigest() != former.digest:
-            raise InputError(
-                f"{folder / TABLE}: has been written since by another program, such as a "
-                f"spreadsheet; {former.path} is the table before"
-            )
-        _write(folder / TABLE, former.contents)
-        former.path.unlink(missing_ok=True)
-    return folder

@@ -128,7 +128,7 @@ class CellMeasure(Protocol):
 
 @dataclass(frozen=True)
 class Measures:
-    """What is measured in the frames of a contact: by default what the paper's features
+    """The measurements of a contact's frames: by default those that the paper's features
     take. `edge.features.names.measures` makes one for other features.
 
     Attributes:

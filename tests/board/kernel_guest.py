@@ -24,6 +24,7 @@ from edge.record.recording import Recording, load
 from edge.record.saving import save
 from edge.wire.bus.linux import LinuxBus
 from edge.wire.bus.protocol import BusBusy, BusDenied, BusFault, BusNack, fetch
+from edge.wire.fake import player
 from edge.wire.fake.clock import VirtualClock
 from edge.wire.fake.player import Playback, calibrated
 from edge.wire.skin import file as skinfile
@@ -128,8 +129,10 @@ def bus(device):
 
 
 @pytest.fixture
-def edge(capsys):
-    """Runs a command, which must succeed; returns the text that it printed."""
+def edge(capsys, monkeypatch):
+    """Runs a command, which must succeed, over fakes without noise; returns the text
+    that it printed."""
+    monkeypatch.setattr(player, "NOISE_COUNTS", 0.0)
 
     def edge(*arguments):
         capsys.readouterr()
@@ -190,7 +193,7 @@ def test_a_command_does_over_the_kernel_what_it_does_over_the_fake_bus(
     results = []
     with plugged(rig.adapter) as device:
         text = rig.path.read_text().replace("device = 0", f'device = "{device}"')
-        for fake in ([], ["--fake", touch, "--noise", 0]):
+        for fake in ([], ["--fake", touch]):
             rig.path.write_text(text)
             printed = edge(command, *arguments, *fake)
             assert printed.count(expected) >= times

@@ -23,7 +23,7 @@ from tests.conftest import ended
 HERE = Path(__file__).resolve().parent
 SYSTEMD = Path("/lib/systemd/systemd")
 UNIT = "edge-classify.service"
-FAKE = "--fake /etc/edge-classify/touch.npz --loop --real-time"
+FAKE = "--fake /etc/edge-classify/touch.npz --loop --web 127.0.0.1:0"
 PROPERTIES = "ActiveState SubState MainPID NRestarts StatusText ExecMainStatus LimitRTTIME".split()
 
 

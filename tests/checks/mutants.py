@@ -1,123 +1,205 @@
-"""`make mutants`: change the code a little, at random places, and see whether a test
-fails.
+"""`make mutants`: exchange one word of the code, at random places, and see whether a fast
+test notices.
 
-mutmut makes the changes in a copy of the tree, `mutants/`, and runs the tests that
-reach the changed function; `[tool.mutmut]` in pyproject.toml names the files and the
-tests. A run draws `--count` mutants, tries them until `--minutes` are over, and prints
-the difference of each mutant that no test noticed. Results are kept in `mutants/`, and
-no mutant is tried twice. The C that export writes is changed by `tests.checks.c_mutants`, a word
-at a time, for half as many mutants. The draws are of `ROOMS`, or of all whose name
-contains `--only`; the exit status is 1 if more than one of 50 is not noticed.
+Each of the `ROOMS` draws `--count` words of Python or C that have another in `WORDS`
+from a stream of its own. In a copy of the checkout a word is exchanged, the room's tests
+run, and the word is put back. The exit status is 1 if more than one of 50 changes of a
+room is not noticed. The tables are in docs/measured/.
 """
 
+import os
+import re
 import shutil
-import signal
-import subprocess
 import sys
-from collections import Counter
+from multiprocessing import get_context
+from pathlib import Path
 from random import Random
+from tempfile import TemporaryDirectory
+from typing import NamedTuple
+
+import pytest
 
 from edge.errors import EdgeError
-from tests.checks import c_mutants
+from tests.checks.__main__ import end_with_parent
+from tests.checks.bench import tables
 from tests.checks.bench.program import start
-from tests.conftest import ended
+from tests.conftest import ROOT
 
-MUTMUT = (sys.executable, "-m", "mutmut")
-UNNOTICED = ("survived", "no tests")
+PACKAGES = ("edge", "train", "export", "tests")
 MOST_UNNOTICED = 1 / 50
-ROOMS = (
-    "edge.wire.bus.",
-    "edge.wire.skin.",
-    "edge.record.labels",
-    "edge.record.saving",
-    "edge.app.commands.label",
-    "edge.app.sinks.page",
-    "edge.app.sinks.web",
-    "export/c/",
+LONGEST_S = 900.0
+"""A loop without an end is noticed."""
+EXCHANGED = [
+    ("<", "<="),
+    (">", ">="),
+    ("==", "!="),
+    ("+", "-"),
+    ("and", "or"),
+    ("&&", "||"),
+    ("True", "False"),
+    ("true", "false"),
+    ("min", "max"),
+    ("any", "all"),
+    ("break", "continue"),
+    ("0", "1"),
+]
+WORDS = dict(EXCHANGED) | {new: old for old, new in EXCHANGED} | {"not": "", "!": ""}
+SKIPPED = {
+    ".py": r'#[^\n]*|@dataclass[^\n]*|strict=\w+|"""(?:\\.|[^\\])*?"""',
+    ".c": r"/\*.*?\*/|//[^\n]*|^\s*#[^\n]*",
+}
+TOKEN = (
+    r""""(?:\\.|[^"\\])*"|'(?:\\.|[^'\\])*'"""
+    r"|\+\+|--|->|<<|>>|[-+*/&|^%]=|[<>=!]=|&&|\|\||[-+<>!]|[\w.]+"
 )
-"""Begin the names of the mutants that are drawn from."""
 
 
-def output(*arguments):
-    """The output of a mutmut command; its errors pass through."""
-    return subprocess.check_output([*MUTMUT, *arguments], text=True)
+class Room(NamedTuple):
+    """Files, and the tests that are to notice their changes, the nearest first."""
+
+    files: str
+    tests: str
 
 
-def statuses():
-    """{name of a mutant: its status}, "not checked" where it was not tried yet."""
-    lines = output("results", "--all", "true").splitlines()
-    return dict(line.strip().rsplit(": ", 1) for line in lines if "__mutmut_" in line)
+ROOMS = {
+    "skin": Room("edge/wire/skin/*.py", "tests/edge/wire/skin"),
+    "bus": Room("edge/wire/bus/*.py", "tests/edge/wire/bus"),
+    "labels": Room(
+        "edge/record/labels.py",
+        "tests/edge/record/test_labels.py tests/edge/app/commands/test_label.py",
+    ),
+    "page": Room(
+        "edge/app/sinks/page.py",
+        "tests/edge/app/sinks/test_page.py tests/edge/app/sinks/test_web.py",
+    ),
+    "model in C": Room(
+        "export/c/*.c", "tests/export/test_c_code.py tests/export/test_image.py"
+    ),
+    "skin in C": Room("export/c/skin/*.c", "tests/export/test_skin_code.py"),
+}
 
 
-def generate():
-    """Make all mutants, and measure which tests reach which function.
+class Change(NamedTuple):
+    """Another word at a place of a file's text."""
+
+    file: str
+    text: str
+    begin: int
+    old: str
+    new: str
+
+    def changed(self):
+        """The file's text with the other word."""
+        return (
+            self.text[: self.begin] + self.new + self.text[self.begin + len(self.old) :]
+        )
+
+    def row(self):
+        """A row of the table of those that no test noticed."""
+        number = self.text.count("\n", 0, self.begin)
+        line, other = (
+            text.splitlines()[number].strip().replace("|", "\\|")
+            for text in (self.text, self.changed())
+        )
+        return {
+            "not noticed": f"{self.file}:{number + 1}",
+            "line": f"`{line}`",
+            "as": f"`{other}`",
+        }
+
+
+def changes(pattern):
+    """Each change of the files of a pattern."""
+    for path in sorted(ROOT.glob(pattern)):
+        text = path.read_text()
+        for match in re.finditer(f"{SKIPPED[path.suffix]}|{TOKEN}", text, re.M | re.S):
+            if match[0] in WORDS:
+                file = path.relative_to(ROOT).as_posix()
+                yield Change(file, text, match.start(), match[0], WORDS[match[0]])
+
+
+def drawn(room, count, seed):
+    """So many changes of a room."""
+    every = list(changes(ROOMS[room].files))
+    return Random(f"{seed} {room}").sample(every, min(count, len(every)))
+
+
+def tested(folder, words):
+    """End this process with the status of pytest in a copy of the checkout."""
+    end_with_parent()
+    os.chdir(folder)
+    os.environ["PYTHONPATH"] = str(folder)
+    for number in (1, 2):
+        os.dup2(os.open(os.devnull, os.O_WRONLY), number)
+    for name in list(sys.modules):
+        if name.partition(".")[0] in PACKAGES:
+            del sys.modules[name]
+    os._exit(pytest.main(words))
+
+
+def passes(room, folder):
+    """Whether the tests of a room pass in a copy of the checkout.
+
+    The process is forked, because the imports take most of the time.
+    """
+    slow = "slow or not slow" if room.endswith("C") else "not slow"
+    words = ["-qx", "-p", "no:cacheprovider", "-m", slow, *ROOMS[room].tests.split()]
+    process = get_context("fork").Process(target=tested, args=(folder, words))
+    process.start()
+    process.join(LONGEST_S)
+    if process.exitcode is None:
+        process.kill()
+        process.join()
+    return process.exitcode == 0
+
+
+def unnoticed(room, changes, folder):
+    """The changes that no test notices in a copy of the checkout.
 
     Raises:
-        SystemExit: a test fails on the unchanged code.
+        EdgeError: a test fails without a change.
     """
-    # mutmut copies tests anew, but leaves those that were deleted here since.
-    shutil.rmtree("mutants/tests", ignore_errors=True)
-    process = ended(*MUTMUT, "run", "no such mutant")
-    if "nothing matches" not in process.stderr:
-        raise SystemExit(process.stdout + process.stderr)
+    if not passes(room, folder):
+        raise EdgeError(f"a test of {ROOMS[room].tests} fails without a change")
+    for change in changes:
+        path = folder / change.file
+        path.write_text(change.changed())
+        if passes(room, folder):
+            print(change.row(), file=sys.stderr)
+            yield change
+        shutil.copy2(ROOT / change.file, path)
 
 
-def run(names, minutes):
-    """Try these mutants until the time is over."""
-    process = subprocess.Popen([*MUTMUT, "run", *names], stdout=subprocess.DEVNULL)
-    try:
-        process.wait(60.0 * minutes)
-    except subprocess.TimeoutExpired:
-        process.send_signal(signal.SIGINT)
-        process.wait()
-
-
-def tried_in_python(count, minutes, only):
-    """{name: status} of mutmut's mutants."""
-    generate()
-    names = drawn(statuses(), count, only)
-    if names:  # mutmut would try all
-        run(names, minutes)
-    return {name: status for name, status in statuses().items() if name in names}
-
-
-def measure(count, minutes, only):
-    """Try a sample of mutants; print those that no test notices, and a count of each
-    status. 1 if too many are not noticed.
+def measure(count, seed, only):
+    """Write the tables; 1 if too many changes of a room are not noticed.
 
     Raises:
-        EdgeError: no mutant's name contains `only`.
+        EdgeError: no room has that name, or a test fails without a change.
     """
-    in_c = c_mutants.changes()
-    of_c = drawn(in_c, count // 2, only)
-    results = {}
-    if not only.startswith("export/c"):
-        results = tried_in_python(count - len(of_c), minutes, only)
-    if not (results or of_c):
-        raise EdgeError(f"no mutant's name contains {only!r}")
-    with c_mutants.copied() as folder:
-        for name in of_c:
-            results[name] = c_mutants.status_of(in_c[name], folder)
-    unnoticed = sorted(name for name in results if results[name] in UNNOTICED)
-    for name in unnoticed:
-        print(f"{results[name]}: {name}\n{in_c.get(name) or output('show', name)}")
-    counts = Counter(results.values())
-    print(", ".join(f"{status}: {n}" for status, n in counts.most_common()))
-    tried = len(results) - counts["not checked"]
-    return 1 if len(unnoticed) > MOST_UNNOTICED * tried else 0
-
-
-def drawn(names, count, only):
-    """So many of the names, of `ROOMS` or those that contain a text."""
-    wanted = [n for n in names if (only in n if only else n.startswith(tuple(ROOMS)))]
-    return Random(2012).sample(wanted, min(count, len(wanted)))
+    rooms = [room for room in ROOMS if only in ("", room)]
+    if not rooms:
+        raise EdgeError(f"--only {only}: the rooms are {', '.join(ROOMS)}")
+    rows = []
+    living = []
+    with TemporaryDirectory() as name:
+        folder = Path(name) / "checkout"
+        ignored = shutil.ignore_patterns(".*", "__pycache__", "build", "dist")
+        shutil.copytree(ROOT, folder, ignore=ignored)
+        for room in rooms:
+            sample = drawn(room, count, seed)
+            alive = list(unnoticed(room, sample, folder))
+            row = {"room": room, "changes": len(sample), "not noticed": len(alive)}
+            rows.append(row)
+            living += alive
+    tables.write("mutants", [rows, [change.row() for change in living]])
+    return int(any(r["not noticed"] > MOST_UNNOTICED * r["changes"] for r in rows))
 
 
 if __name__ == "__main__":
     start(
         measure,
         __doc__,
-        ("--count", 200, "mutants to draw"),
-        ("--minutes", 15.0, "at most"),
-        ("--only", "", "draw from mutants whose name contains this"),
+        ("--count", 50, "words to exchange in each room"),
+        ("--seed", 2012, "of the draws"),
+        ("--only", "", "the room"),
     )

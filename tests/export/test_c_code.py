@@ -30,7 +30,7 @@ from edge.wire.skin import file as skinfile
 from export import c_code, skin_code
 from export.image import record
 from tests.conftest import ROOT, ended, export, in_a_row, touch
-from tests.edge.decide.test_engines import hostile
+from tests.edge.decide.test_knn import hostile
 from tests.export.microcontroller import machine
 from tests.export.microcontroller.comparison import (
     assert_same,

@@ -14,15 +14,13 @@ from edge.decide.classifier import Classifier
 from edge.decide.early import fastest, stopping_rules
 from edge.decide.events import Decided
 from edge.decide.model import Model
-from edge.decide.verify import first_series, verify
-from edge.errors import InputError, OutOfRange
+from edge.decide.verify import first_series
+from edge.errors import InputError
 from edge.features.vector import FEATURES
 from edge.record.saving import save
 from export.api import save as save_model
-from tests.checks.hard_cases import exact
 from tests.checks.hard_cases.models import session
 from tests.conftest import PAPER, export, save_touches
-from tests.edge.decide.test_engines import assert_same_bits, hostile
 from tests.sequential import fitted_model
 from train.data.dataset import load_trials
 from train.model.pipeline import Choice
@@ -60,41 +58,9 @@ def decided(model, recording, error):
     return {event.task: event for event in events if isinstance(event, Decided)}
 
 
-def mean_of_roots(squares, unit):
-    """The mean of the whole roots of squares, in integers but for one division."""
-    wholes = [round(exact.root(round(square / unit**2))) for square in squares.tolist()]
-    return sum(wholes) / len(wholes) * unit
-
-
-def test_the_graph_measures_each_label_as_the_estimator_does(early, tmp_path):
-    """Labels of 100, 30 and 2 trials: a twentieth, the nearest three, and both there
-    are."""
-    rng = np.random.default_rng(0)
-    labels = rng.permutation(np.repeat(["common", "known", "rare"], [100, 30, 2]))
-    width = early.info.samples * len(FEATURES)
-    X = rng.normal(size=(3, len(labels), width))
-    queries = rng.normal(size=(9, width))
-    choices = {"t": Choice("none", 4, 3)}
-    path = tmp_path / "model.onnx"
-    sequential, model = fitted_model(path, early.info, choices, X, {"t": labels})
-    for point, fitted in enumerate(sequential.decision_points_):
-        for label, (size, count) in enumerate([(100, 5), (30, 3), (2, 2)]):
-            squares = fitted.tasks_["t"].squares(queries)[
-                :, fitted.tasks_["t"].labels == label
-            ]
-            assert squares.shape[1] == size
-            nearest = np.sort(squares, axis=1)[:, :count]
-            distances = model.run(queries, point)["t_label_distances"][:, label]
-            expected = [mean_of_roots(row, fitted.tasks_["t"].unit) for row in nearest]
-            assert distances.tolist() == [
-                fitted.tasks_["t"].slope * mean for mean in expected
-            ]
-
-
 @pytest.fixture(scope="module")
 def with_early_settings(early, tmp_path_factory):
-    """Vectors, and an estimator and a model whose tasks take other features and other
-    directions before 1.2 s; one of them shares a space with another there alone."""
+    """Vectors, and a model whose tasks take other features before 1.2 s."""
     rng = np.random.default_rng(3)
     X = rng.normal(size=(3, 45, early.info.width))
     choices = {
@@ -108,74 +74,21 @@ def with_early_settings(early, tmp_path_factory):
     }
     settings = EarlySettings(at_first, [at_first] * 10)
     path = tmp_path_factory.mktemp("early") / "model.onnx"
-    return X, *fitted_model(path, early.info, choices, X, LABELS, settings)
-
-
-def test_decision_points_may_have_features_and_directions_of_their_own(
-    with_early_settings,
-):
-    X, sequential, model = with_early_settings
-    queries = np.random.default_rng(4).normal(size=(9, X.shape[2]))
-    queries *= 10.0 ** np.arange(-2, 7)[:, None]
-    queries[0] = sequential.space_.points[1].mean  # nothing lies outside the components
-    scores = sequential.space_.scores(np.stack([queries] * 3))
-    for point, fitted in enumerate(sequential.decision_points_):
-        answers = model.run(queries, point)
-        for kind in ("novelty", "remoteness"):
-            assert min(answers[kind]) > 0.0
-            assert (answers[kind] == getattr(scores, kind)[point]).all()
-        for task in sequential.choices:
-            distances, rows = fitted.tasks_[task].neighbours(queries)
-            assert (answers[f"{task}_neighbours"] == rows).all()
-            assert (answers[f"{task}_distances"] == distances).all()
-    for fitted in sequential.decision_points_[0].tasks_.values():
-        assert len(fitted.space.columns) == len(queries[0]) // len(FEATURES)
+    return X, fitted_model(path, early.info, choices, X, LABELS, settings)[1]
 
 
 def test_a_far_feature_matters_only_where_a_decision_point_takes_it(
     with_early_settings,
 ):
-    X, _, model = with_early_settings
+    X, model = with_early_settings
     far = X[0, :1].copy()
     far[0, 0] = 1e6
     outside = [model.run(far, point)["out_of_range"].tolist() for point in range(3)]
     assert outside == [[0.0], [0.0], [1.0]]
 
 
-@pytest.mark.parametrize("value", [np.nan, np.inf])
-def test_what_is_not_finite_is_refused_at_points_that_do_not_take_it(
-    with_early_settings, value
-):
-    X, sequential, model = with_early_settings
-    wrong = X[0, 0].copy()
-    wrong[0] = value
-    for point in range(3):
-        answers = model.run(wrong[None], point)
-        assert all(answers[f"{task}_label"] == -1 for task in sequential.choices)
-        with pytest.raises(OutOfRange):
-            model.decide(wrong, point)
-
-
-def test_early_settings_are_the_same_bits_in_numpy(with_early_settings):
-    _, _, model = with_early_settings
-    rng = np.random.default_rng(2)
-    assert_same_bits(model.path, hostile(model.info.width, rng))
-
-
-def test_the_golden_file_holds_what_is_answered_at_each_decision_point(early, folder):
-    golden = np.load(folder / "out" / "golden.npz")
-    assert all(check.passed for check in verify(early, folder / "out" / "golden.npz"))
-    for point, vectors in enumerate(golden["decision_point_vectors"]):
-        answers = early.run(vectors, point)
-        for task in early.info.tasks:
-            stored = golden[f"{task}_decision_point_distances"][point]
-            np.testing.assert_array_equal(stored, answers[f"{task}_distances"])
-
-
 def test_a_stream_that_ends_before_any_rule_is_sure_is_decided_at_its_end(
-    early,
-    make_touch,
-    error,
+    early, make_touch, error
 ):
     events = decided(early, make_touch(kind="soft", seed=50, seconds=0.25), error)
     assert list(events) == list(early.info.tasks)
@@ -241,22 +154,19 @@ def strange(make_touch):
     return replace(ordinary, frames=np.minimum(ordinary.frames.astype(int) * 40, 65535))
 
 
-def stops_of(events):
-    """The windows of decisions, and whether they are flagged as unusual."""
-    return {(event.window_s, "unusual" in event.flags) for event in events.values()}
-
-
-def test_a_touch_like_others_does_not_wait(hasty, make_touch):
+def test_a_touch_unlike_all_others_waits_and_is_flagged_as_unusual(
+    hasty, make_touch, strange
+):
     model, error = hasty
-    events = decided(model, make_touch(kind="hard", seed=50), error)
-    assert stops_of(events) == {(0.3, False)}
-    assert {event.stopped_by for event in events.values()} == {"confidence"}
-
-
-def test_a_touch_unlike_all_others_waits_and_is_flagged(hasty, strange):
-    model, error = hasty
-    assert stops_of(decided(model, strange, error)) == {(1.2, True)}
-    assert stops_of(decided(model, strange, None)) == {(1.2, True)}
+    ordinary = make_touch(kind="hard", seed=50)
+    for touch, rate, stop in (
+        (ordinary, error, (0.3, "confidence", False)),
+        (strange, error, (1.2, "confidence", True)),
+        (strange, None, (1.2, None, True)),
+    ):
+        for event in decided(model, touch, rate).values():
+            flagged = "unusual" in event.flags
+            assert (event.window_s, event.stopped_by, flagged) == stop
 
 
 @pytest.mark.parametrize("early_ones", [True, False])
@@ -285,24 +195,18 @@ def test_an_error_that_no_task_certifies_is_refused_with_what_would_do(early):
         Classifier(early, error=0.001)
 
 
+@pytest.mark.parametrize("level", ["ORT_DISABLE_ALL", "ORT_ENABLE_ALL"])
 def test_a_stranger_with_onnxruntime_alone_is_answered_at_the_full_window(
-    early, folder
+    early, folder, level
 ):
-    """At every level of optimisation: the default is no constant to be folded."""
+    """The default is no constant to be folded."""
     X = load_trials([folder / "data"]).features(early.info.window_s)
-    expected = early.run(X)
     data = Path(early.path).read_bytes()
-    for level in (
-        GraphOptimizationLevel.ORT_DISABLE_ALL,
-        GraphOptimizationLevel.ORT_ENABLE_ALL,
-    ):
-        runtime = session(data, level)
-        names = [output.name for output in runtime.get_outputs()]
-        outputs = runtime.run(names, {"features": X})
-        assert [v.tolist() for v in outputs] == [
-            expected[name].tolist() for name in names
-        ]
-        assert set(names) == set(expected)
+    runtime = session(data, getattr(GraphOptimizationLevel, level))
+    names = [output.name for output in runtime.get_outputs()]
+    outputs = zip(names, runtime.run(names, {"features": X}), strict=True)
+    expected = {name: values.tolist() for name, values in early.run(X).items()}
+    assert {name: values.tolist() for name, values in outputs} == expected
 
 
 def pressed(make_touch, seeds):

@@ -6,6 +6,7 @@ from edge.features.vector import WINDOW_S
 from train.choose.options import FitOptions
 from train.choose.settings import Settings
 from train.data.dataset import DataSet
+from train.data.vectors import MOST_ROWS
 from train.model.novelty import MOST_COMPONENTS
 from train.model.pipeline import Choices
 from train.model.stopping import FEWEST
@@ -76,26 +77,26 @@ def usual_points(
 def _size(points: int, dataset: DataSet, settings: Settings, samples: int) -> int:
     """Bytes of the constants of a model with so many decision points."""
     columns = sum(dataset.widths(samples))
-    trials = len(dataset.trials)
+    trials = min(len(dataset.trials), MOST_ROWS)
     shared = 2 * MOST_COMPONENTS * columns
     novelty = MOST_COMPONENTS * (2 * trials + 4 * MOST_COMPONENTS)
     novelty += 8 * columns + 24 * trials
     early = settings.choices
     if settings.early is not None:
         early = {**early, **settings.early.choices}
-    full = _bytes_of(settings.choices, dataset, samples)
-    before = (points - 1) * (novelty + _bytes_of(early, dataset, samples))
+    rows = settings.rows(dataset)
+    full = _bytes_of(settings.choices, dataset, samples, rows)
+    before = (points - 1) * (novelty + _bytes_of(early, dataset, samples, rows))
     return shared + before + novelty + full
 
 
-def _bytes_of(choices: Choices, dataset: DataSet, samples: int) -> int:
+def _bytes_of(choices: Choices, dataset: DataSet, samples: int, rows: int) -> int:
     """Bytes of the constants that project and compare at a decision point.
 
-    A column has a mean, a gain, and a weight for each coordinate; a trial its
+    A column has a mean, a gain, and a weight for each coordinate; a row its
     coordinates and their length. Tasks that share a space share these.
     """
     widths = dict(zip(dataset.names, dataset.widths(samples), strict=True))
-    trials = len(dataset.trials)
     sizes: dict[object, int] = {}
     for task, choice in choices.items():
         columns = sum(widths[name] for name in choice.features)
@@ -103,8 +104,8 @@ def _bytes_of(choices: Choices, dataset: DataSet, samples: int) -> int:
         if choice.projection == "lda":
             targets = choice.targets or (task,)
             components = sum(len(set(dataset.labels(t).tolist())) - 1 for t in targets)
-        components = min(components, trials)
-        size = columns * (16 + 4 * components) + trials * (8 + 4 * components)
+        components = min(components, len(dataset.trials))
+        size = columns * (16 + 4 * components) + rows * (8 + 4 * components)
         space = choice.space(task)
         sizes[space] = max(sizes.get(space, 0), size)
     return sum(sizes.values())

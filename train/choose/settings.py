@@ -9,7 +9,8 @@ import numpy as np
 from edge.arrays import Integers
 from train.choose.candidates import Candidate
 from train.choose.evaluate import NestedAccuracy
-from train.data.folds import finest, stratified_folds
+from train.data.dataset import DataSet
+from train.data.folds import finest, label_sets, stratified_folds
 from train.data.vectors import Labels
 from train.model.pipeline import Choice, Choices
 from train.model.stopping import EarlySettings
@@ -45,6 +46,11 @@ class Chosen:
     by_fold: tuple[dict[str, Choice], ...] = ()
 
 
+def alone(choices: Choices) -> dict[str, Choice]:
+    """The choices with one neighbour, which votes alone."""
+    return {task: replace(choice, k=1) for task, choice in choices.items()}
+
+
 @dataclass(frozen=True)
 class Settings:
     """The settings that a fit has chosen.
@@ -57,6 +63,7 @@ class Settings:
         window_s: of the full decision.
         early: settings of earlier decision points; None where those of the full window
             serve for all.
+        prototypes: most of a set of labels; 0 where each trial is a row of the model.
     """
 
     chosen: dict[str, Chosen]
@@ -65,6 +72,23 @@ class Settings:
     candidates: Sequence[Candidate]
     window_s: float
     early: EarlySettings | None = None
+    prototypes: int = 0
+
+    def in_prototypes(self, count: int) -> Self:
+        """The settings of a model whose rows are so many prototypes of each set of
+        labels, of which the nearest alone votes."""
+        early = self.early
+        if early is not None:
+            by_fold = list(map(alone, early.by_fold))
+            early = EarlySettings(alone(early.choices), by_fold)
+        chosen = {
+            task: replace(settled, choice=replace(settled.choice, k=1))
+            for task, settled in self.chosen.items()
+        }
+        without = list(map(alone, self.without))
+        return replace(
+            self, chosen=chosen, without=without, early=early, prototypes=count
+        )
 
     def with_others(self, chosen_by: Integers, y: Labels) -> Self:
         """The settings with folds for all trials, of which some had no part in the
@@ -82,6 +106,13 @@ class Settings:
     def choices(self) -> dict[str, Choice]:
         """{task: its choice}."""
         return {task: settled.choice for task, settled in self.chosen.items()}
+
+    def rows(self, dataset: DataSet) -> int:
+        """Most rows of a model of some trials."""
+        if not self.prototypes:
+            return len(dataset.trials)
+        y = {task: dataset.labels(task) for task in self.chosen}
+        return self.prototypes * len(np.unique(label_sets(y)))
 
     @property
     def tested(self) -> int:

@@ -24,6 +24,7 @@ from edge.touch.arm import Chain
 from edge.writing import remove_leftovers
 from train import former_recordings
 from train.data.broken import BrokenTaxels
+from train.data.scratch import Scratch
 from train.data.thresholds import proposed
 from train.importers import Refused, Trial, names
 from train.importers.look import contacts_in, rows_of
@@ -116,6 +117,7 @@ def write(
     status."""
     recordings: dict[str, Recording] = {}
     taxels = BrokenTaxels()
+    scratch = Scratch()
     skipped: list[str] = []
     for result in bar(trials, desc="importing", unit=" trials"):
         if isinstance(result, Refused):
@@ -128,8 +130,8 @@ def write(
         except InputError as error:
             skipped.append(str(error))
             continue
-        recordings[name] = recording
         taxels.add(recording)
+        recordings[name] = scratch.put_fields(recording)
     if skipped and not recordings:
         raise InputError(skipped[0])
     _say_look(recordings, taxels)

@@ -24,12 +24,16 @@ def stratified_folds(y: Strings, count: int = FOLDS, seed: int = SEED) -> Intege
     return folds
 
 
+def label_sets(y: Labels) -> Strings:
+    """(n,) the labels of each trial for all tasks, joined."""
+    rows = zip(*y.values(), strict=True)
+    return np.array(["\0".join(of_trial) for of_trial in rows])
+
+
 def representative(y: Labels, count: int) -> Integers:
     """(m,) numbers of about so many of the trials, rising: all where they are no more,
     else as many of each object as its share is, and one of each set of labels."""
-    labels = np.array(
-        ["\0".join(of_trial) for of_trial in zip(*y.values(), strict=True)]
-    )
+    labels = label_sets(y)
     n = len(labels)
     if n <= count:
         return np.arange(n)

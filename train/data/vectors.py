@@ -14,6 +14,8 @@ from edge.features.vector import FEATURES
 
 Strings = NDArray[np.str_]
 
+MOST_ROWS = 500
+"""Trials that are the rows of a model themselves; of more, few rows stand for all."""
 BLOCK = 1 << 22
 """Entries of a matrix that is made at once."""
 Labels = Mapping[str, Strings]
@@ -56,12 +58,20 @@ class Vectors:
         y: {task: (n,) labels}.
         features: names of the feature types, in the order of X.
         widths: columns of each; equal where None.
+        prototypes: (n,) the number of each trial's prototype; None where each trial is
+            a row of a model itself.
     """
 
     X: Floats = field(repr=False)
     y: Labels = field(repr=False)
     features: Sequence[str] = FEATURES
     widths: Sequence[int] | None = None
+    prototypes: Integers | None = field(default=None, repr=False)
+
+    @property
+    def trials(self) -> int:
+        """Number of trials."""
+        return int(self.X.shape[-2])
 
     @property
     def columns(self) -> tuple[int, ...]:
@@ -85,10 +95,11 @@ class Vectors:
             widths=tuple(compress(self.columns, is_named)),
         )
 
-    def part(self, trials: NDArray[Any]) -> Self:
-        """Some of the trials, by a mask (n,) or by their numbers."""
+    def part(self, trials: NDArray[Any] | slice) -> Self:
+        """Some of the trials, by a mask (n,), by their numbers or by a slice."""
         return replace(
             self,
             X=self.X[..., trials, :],
             y={task: labels[trials] for task, labels in self.y.items()},
+            prototypes=None if self.prototypes is None else self.prototypes[trials],
         )

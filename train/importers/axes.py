@@ -2,7 +2,6 @@
 
 import re
 from collections import defaultdict
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Self
 
@@ -74,37 +73,6 @@ class Axes:
         )
 
 
-@dataclass(frozen=True, kw_only=True)
-class Parted(Table):
-    """A table of the normal axis, by names without the letter, and all other columns.
-
-    Attributes:
-        whole: the table as it stands.
-        axes: the columns of the whole table, a row for each taxel, a column for each
-            letter.
-    """
-
-    whole: Table
-    axes: pd.DataFrame
-
-    @property
-    def candidates(self) -> list[str]:
-        """The names of the taxels that have three axes."""
-        return list(self.axes.index)
-
-    def values(self, names: Sequence[str]) -> NDArray[np.float64]:
-        """(n, taxels, 3) values x, y and z of some taxels.
-
-        Raises:
-            InputError: one of them has no such columns.
-        """
-        for name in names:
-            if name not in self.axes.index:
-                raise InputError(f"{self.where}: taxel {name} has one axis alone")
-        columns = self.axes.loc[list(names)].to_numpy()
-        return self.whole.numbers(columns.ravel()).reshape(-1, *columns.shape)
-
-
 def lettered(name: str) -> tuple[str, str] | None:
     """The letter of a column's axis, and its name without it; None without one."""
     if match := LAST.fullmatch(name) or FIRST.fullmatch(name):
@@ -112,16 +80,12 @@ def lettered(name: str) -> tuple[str, str] | None:
     return None
 
 
-def parted(table: Table, normal: str) -> Parted:
-    """The normal axis of a table apart from the two others.
+def parted(table: Table) -> Table:
+    """A table whose taxels have three axes.
 
     Columns without letters are read three by three, as x, y and z of one taxel after
     another, where the table has no header, or is an array whose last axis has three
     entries.
-
-    Args:
-        table: as it stands in the file.
-        normal: letter of the normal axis.
 
     Raises:
         InputError: the columns of the axes do not belong together.
@@ -137,14 +101,10 @@ def parted(table: Table, normal: str) -> Parted:
             f"{table.where}: {short_text(sorted(odd)[:3])} lacks one of the axes x, y, z; "
             "leave --axes out, or fix the names"
         )
-    taxel_of = dict(zip(axes[normal], axes.index, strict=True))
-    plain = table.data.drop(columns=axes.to_numpy().ravel())
     # A magnitude may have the taxel's name.
-    plain = plain.rename(columns={name: f"{name} without axes" for name in axes.index})
-    normals = table.data[[name for name in table.names if name in taxel_of]]
-    data = pd.concat([plain, normals.rename(columns=taxel_of)], axis=1)
-    normal_table = replace(table, data=data, shape=shape, file_names=())
-    return Parted(**vars(normal_table), whole=table, axes=axes)
+    magnitudes = axes.index.difference(axes.to_numpy().ravel())
+    data = table.data.rename(columns={name: f"{name} norm" for name in magnitudes})
+    return replace(table, data=data, shape=shape, file_names=(), axes=axes)
 
 
 def _by_letters(table: Table) -> pd.DataFrame:

@@ -4,6 +4,7 @@ left out."""
 import math
 import re
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import cache
 from itertools import pairwise
@@ -28,9 +29,9 @@ UNIT_NAMES = {
 UNITS = {name: unit for unit, names in UNIT_NAMES.items() for name in names.split()}
 TIME = re.compile(
     r"(?:(?:elapsed|relative|rel|system|sys|log|frame)[ _]*)?"
-    r"(?:ts|t|time|time_?stamp|stamp|clock|datetime)"
+    r"(?:ts|t|time|time_?stamp|stamp|clock|datetime|epoch|zeit|zeitstempel)"
     rf"(?:[ _]*[\[(]?(?P<unit>{'|'.join(UNITS)})[\])]?)?"
-    rf"|(?P<alone>{'|'.join(name for name in UNITS if len(name) > 4)})",
+    rf"|(?P<alone>{'|'.join(name for name in UNITS if len(name) > 1)})",
     re.IGNORECASE,
 )
 """Names of a column of times, with its unit if they tell it."""
@@ -40,9 +41,10 @@ MINUTES = r"(?<!:)\b(\d+:\d+[.,])"
 """How minutes and seconds with a fraction begin, as Excel writes them."""
 RUNNING = (
     r"\A(?P<stem>.*?)(?P<first>\d{1,9})"
-    r"(?:(?:[_x]|, ?|\]\[)(?P<second>\d{1,9}))?\]?\Z"
+    r"(?:(?:[_x]|, ?|\]\[)(?P<second>\d{1,9}))?\]?(?: ?[\[(][^\d\W]+[\])])?\Z"
 )
-"""A name with a number at its end, or with a row and a column: s1, s[1], s_1_2, s[1][2]."""
+"""A name with a number at its end, or with a row and a column: s1, s[1], s_1_2, s[1][2];
+a unit may stand behind it."""
 EPOCHS = {"ns": 9e17, "us": 9e14, "ms": 9e11, "s": 9e8}
 """The least time since 1970 in each unit that a log of today has."""
 LONGEST_STEP = 0.25
@@ -128,22 +130,34 @@ def columns(table: Table, terms: str) -> list[str]:
 
 def _term(table: Table, term: str) -> list[str]:
     names = list(table.file_names) or table.names
-    for all_names in (names, table.names):
-        if term in all_names:
-            return [term]
-    array = [name for name in names if name.startswith(f"{term}.")]
-    if array:
+    if term in [*names, *table.names]:
+        return [term]
+    if array := [name for name in names if name.startswith(f"{term}.")]:
         return array
     ends = term.split("-")
     for places in (names, numbered("", len(names))):
         if len(ends) <= 2 and set(ends) <= set(places):
-            first = places.index(ends[0])
-            last = places.index(ends[-1])
-            if first <= last:
-                return names[first : last + 1]
+            span = names[places.index(ends[0]) : places.index(ends[-1]) + 1]
+            if span:
+                return span
     raise InputError(
         f"{table.where}: has no column {term[:40]}; it has {short_text(names)}"
     )
+
+
+def typed(table: Table, names: Sequence[str]) -> str:
+    """Some columns as an option takes them: a range where it gives them, and by their
+    places where a sign in their names means something else."""
+    columns_of_file = list(table.file_names) or table.names
+    terms = list(names)
+    if set(" ,;-()[]'\"") & set("".join(names)):
+        terms = [str(columns_of_file.index(name) + 1) for name in names]
+    if len(terms) > 1:
+        span = f"{terms[0]}-{terms[-1]}"
+        with suppress(InputError):
+            if columns(table, span) == list(names):
+                return span
+    return ",".join(terms)
 
 
 def column(table: Table, option: str, terms: str) -> str:
@@ -176,50 +190,48 @@ def meaning(table: Table, options: TableOptions) -> Meaning:
         used.add(column(table, "--onset-column", options.onset_column))
     rest = [name for name in table.names if name not in used]
     taxels, shape = _taxels(table, rest, options)
-    for name in sorted(set(taxels).difference(rest)):
+    for name in used.intersection(taxels):
         raise InputError(
             f"{table.where}: column {name} is named both as a taxel and as time, joint "
             "or onset"
         )
-    felt = set(taxels)
-    left_out = [name for name in rest if name not in felt]
+    left_out = [name for name in rest if name not in set(taxels)]
     unit, source = _unit(table, time, options)
     is_told = any((table.named, table.shape, options.taxels))
     # A form that makes the time, or a column of each taxel, knows what they are.
     is_told |= time is not None and time not in (table.file_names or table.names)
-    shape = table.shape or shape
     return Meaning(taxels, joints, left_out, shape, time, unit, source, not is_told)
 
 
 def _time_column(
-    table: Table,
-    joints: Sequence[str],
-    options: TableOptions,
+    table: Table, joints: Sequence[str], options: TableOptions
 ) -> str | None:
     """The column of times; None where --rate gives them."""
     if options.time:
-        if options.rate is not None:
-            raise InputError(
-                f"{table.where}: --time and --rate tell one thing; give one"
-            )
         return column(table, "--time", options.time)
     if options.rate is not None:
         return None
-    times = named_times(table, joints)
-    if not times:
-        raise InputError(
-            f"{table.where}: no column is a time; give --rate HZ, such as --rate 100, or "
-            f"--time COL, among {short_text(table.names)}"
-        )
-    return times[0]
+    if times := named_times(table, joints):
+        return times[0]
+    numbers = table.data.select_dtypes("number")
+    rising = [
+        typed(table, [name])
+        for name in numbers
+        if (numbers[name].diff()[1:] > 0.0).all()
+    ]
+    raise InputError(
+        f"{table.where}: no column is called a time; give --rate HZ, such as --rate 100, "
+        f"or --time {' or '.join(rising) or 'COL'}, among {short_text(table.names)}"
+    )
 
 
 def named_times(table: Table, joints: Sequence[str] = ()) -> list[str]:
     """The column that is called a time, the one with most values where there are
     several, or else the only one of dates."""
-    dates = [name for name in table.names if is_date(table, name)]
-    named = [n for n in filter(TIME.fullmatch, table.names) if n not in joints]
+    names = [name for name in table.data if name not in joints]
+    dates = [name for name in names if is_date(table, name)]
     numbers = table.data.select_dtypes("number").columns
+    named = list(filter(TIME.fullmatch, names))
     named = [name for name in named if name in dates or name in numbers] or named
     if named:
         return [max(named, key=lambda name: table.data[name].nunique())]
@@ -235,22 +247,17 @@ def is_date(table: Table, name: str) -> bool:
 
 
 def _taxels(
-    table: Table,
-    rest: list[str],
-    options: TableOptions,
+    table: Table, rest: list[str], options: TableOptions
 ) -> tuple[list[str], tuple[int, ...]]:
-    """The taxels, and their shape where their names tell it."""
+    """The taxels, and their shape where the table or their names tell it."""
     if options.taxels:
-        return columns(table, options.taxels), ()
+        return columns(table, options.taxels), table.shape
     arrays = table.arrays.values()
-    complete = [names for names in arrays if len(names) == math.prod(table.shape)]
-    if table.shape and len(complete) == 1:
-        return complete[0], ()
-    candidates = set(table.candidates)
-    if not table.named:
-        numbers = table.data.select_dtypes(["number", "bool"]).columns
-        return [name for name in rest if name in numbers] or rest, ()
-    return _running(table, list(filter(candidates.__contains__, rest)))
+    frames = [names for names in arrays if len(names) == math.prod(table.shape)]
+    if table.shape and len(frames) == 1:
+        return frames[0], table.shape
+    candidates = table.candidates(rest)
+    return _running(table, candidates) if table.named else (candidates, table.shape)
 
 
 def _running(table: Table, rest: Sequence[str]) -> tuple[list[str], tuple[int, ...]]:
@@ -264,14 +271,20 @@ def _running(table: Table, rest: Sequence[str]) -> tuple[list[str], tuple[int, .
     if grids:
         spans = " or ".join(spanned(names) for names, _ in grids)
         raise InputError(
-            f"{table.where}: are the taxels {spans}? Name them by --taxels "
-            f"{grids[0][0][0]}-{grids[0][0][-1]}, and joint angles by --joints"
+            f"{table.where}: are the taxels {spans}? Give --taxels "
+            f"{typed(table, grids[0][0])}, and joint angles by --joints"
         )
-    three = ", or --axes xyz for taxels of three axes" * any(map(lettered, rest))
-    running = ",".join(filter(re.compile(RUNNING).match, rest))
-    raise InputError(
-        f"{table.where}: no columns are named as taxels, such as s1 to s16 without a gap; "
-        f"give --taxels {running or 'COLS'}{three}, among {short_text(list(rest))}"
+    raise InputError(f"{table.where}: {_no_taxels(table, rest)}")
+
+
+def _no_taxels(table: Table, names: Sequence[str]) -> str:
+    """What to type where no columns are named as taxels."""
+    three = ", or --axes xyz for taxels of three axes" * any(map(lettered, names))
+    numbers = table.data.select_dtypes("number").columns
+    terms = [name for name in names if name in numbers] or names
+    return (
+        "no columns are named as taxels, such as s1 to s16 without a gap; give --taxels "
+        f"{typed(table, terms)}{three}, without what is no taxel"
     )
 
 
@@ -305,9 +318,9 @@ def _unit(
     """The unit of times, and how it is known."""
     if time is None:
         return "s", "by --rate"
-    name = TIME.fullmatch(time)
-    stated = table.units.get(time) or (name and (name["unit"] or name["alone"]))
-    unit = options.time_unit or UNITS.get((stated or "").lower())
+    match = TIME.fullmatch(time)
+    words = filter(None, [table.units.get(time), *(match.groups() if match else [])])
+    unit = options.time_unit or UNITS.get(next(words, "").lower())
     if unit == "iso" or (unit is None and is_date(table, time)):
         return "iso", "times of the day"
     return (unit, "as said") if unit else _likely_unit(table, time)

@@ -32,6 +32,8 @@ LEAST_REST = 10.0
 """Whole numbers that rest below it are counts with some noise."""
 CODES = (65535.0, 4095.0)
 """Numbers that some loggers write for a missing value, beside negative ones."""
+TAIL = len(CODES) + 2
+"""Distinct values at each end of a trial's that tell which of all stand alone."""
 DECIMALS = 6
 """Most decimals that signed values keep."""
 PART = 1 << 16
@@ -153,7 +155,8 @@ class Rest:
         Raises:
             InputError: the values are no counts, or too large.
         """
-        if not self.suits(trial):
+        counts = self.counts(trial)
+        if counts is None:
             raise self.refusal(trial)
         skin = {**meta.get("skin", {}), "rows": shape[0], "cols": shape[1]}
         meta = {**meta, "skin": skin}
@@ -161,11 +164,8 @@ class Rest:
             normal = self.values[:, 0].tolist()
             at_rest = [None if math.isnan(value) else value for value in normal]
             meta["values"] = {"counts_per_unit": self.scale, "rest": at_rest}
-        valid = self._valid(trial).reshape(-1, *shape)
-        # A part at a time, as a long recording would else fill the memory several
-        # times.
-        parts = [np.rint(part).astype(np.int32) for part in self._counts(trial)]
-        counts = np.concatenate(parts).reshape(*valid.shape, -1)
+        valid = self._valid(trial.values).reshape(-1, *shape)
+        counts = counts.reshape(*valid.shape, -1)
         axes = counts.shape[3]
         if axes == 3:
             skin["axes"] = axes
@@ -178,24 +178,29 @@ class Rest:
             shear=counts[..., 1:].astype(np.int16) if axes == 3 else None,
         )
 
-    def suits(self, trial: Samples) -> bool:
-        """Whether a trial's values become counts within their range, which are whole
-        where no scale makes them so."""
+    def counts(self, trial: Samples) -> NDArray[np.int32] | None:
+        """(n, taxels, axes) counts, 0 where not valid; None where values are no counts
+        within their range, which are whole where no scale makes them so."""
         is_exact = self.scale == 1.0 and self.values is None
-        for counts in self._counts(trial):
+        parts = []
+        # A part at a time, as a long recording would else fill the memory several
+        # times.
+        for values in np.array_split(trial.values, len(trial.t) // PART + 1):
+            valid = self._valid(values)[..., None]
+            counts = np.where(valid, values - self.base, 0.0) * self.scale
+            normal = counts[..., 0]
+            if self.values is not None:
+                normal[...] = np.maximum(-normal, 0.0) if self.falls else abs(normal)
             whole = np.rint(counts)
-            normal = whole[..., 0]
-            if (
-                normal.min() < 0.0
-                or normal.max() > MOST_COUNTS
-                or _largest(whole[..., 1:]) > MOST_SHEAR
-                or (is_exact and not np.array_equal(counts, whole))
-            ):
-                return False
-        return True
+            is_within = normal.min() > -0.5 and normal.max() < MOST_COUNTS + 0.5
+            is_within &= _largest(whole[..., 1:]) <= MOST_SHEAR
+            if not is_within or (is_exact and not np.array_equal(counts, whole)):
+                return None
+            parts.append(whole.astype(np.int32))
+        return np.concatenate(parts)
 
     def refusal(self, trial: Samples) -> InputError:
-        """Why a trial's values do not suit."""
+        """Why a trial's values are no counts."""
         finite = trial.values[np.isfinite(trial.values)]
         return InputError(
             f"{trial.where}: {finite.min():g} to {finite.max():g} are no counts (whole "
@@ -203,21 +208,9 @@ class Rest:
             f"{self.lacking}, or see --falls and --taxels"
         )
 
-    def _valid(self, trial: Samples) -> NDArray[np.bool_]:
+    def _valid(self, values: NDArray[np.float64]) -> NDArray[np.bool_]:
         """(n, taxels) which taxels have a value, and one at rest."""
-        return np.asarray(np.isfinite(trial.values - self.base).all(axis=2))
-
-    def _counts(self, trial: Samples) -> Iterator[NDArray[np.float64]]:
-        """Counts (rows, taxels, axes) of some frames after another, 0 where not valid."""
-        valid = self._valid(trial)[..., None]
-        for at in range(0, len(valid), PART):
-            part = slice(at, at + PART)
-            moved = trial.values[part] - self.base
-            counts = np.where(valid[part], moved, 0.0) * self.scale
-            if self.values is not None:
-                normal = counts[..., 0]
-                counts[..., 0] = np.maximum(-normal, 0.0) if self.falls else abs(normal)
-            yield counts
+        return np.asarray(np.isfinite(values - self.base).all(axis=2))
 
 
 def rest_of(trials: Sequence[Samples], options: ValueOptions) -> Rest:
@@ -227,17 +220,17 @@ def rest_of(trials: Sequence[Samples], options: ValueOptions) -> Rest:
     Raises:
         InputError: most trials lack an option; the sentence names it.
     """
-    codes = _say_missing(trials, options.missing)
+    codes = _say_missing(trials, options.missing or [])
     rest = Rest(scale=options.scale)
     if options.falls or options.signed:
         rest = _moved(trials, options)
     elif not (options.counts or codes):
         _require_rest_at_zero(trials)
-    refused = [trial for trial in trials if not rest.suits(trial)]
-    if refused:
-        rest = replace(rest, lacking=_lacking(refused, rest, codes))
-    if 2 * len(refused) > len(trials):
-        raise rest.refusal(refused[0])
+    odd = [trial for trial in trials if rest.counts(trial) is None]
+    if odd:
+        rest = replace(rest, lacking=_lacking(odd, rest, codes))
+    if 2 * len(odd) > len(trials):
+        raise rest.refusal(odd[0])
     return rest
 
 
@@ -247,26 +240,26 @@ def _require_rest_at_zero(trials: Sequence[Samples]) -> None:
     Raises:
         InputError: they do; the sentence names the option that subtracts the rest.
     """
-    starts = {
-        i: pd.DataFrame(trial.values[:START, :, 0])
-        for i, trial in enumerate(trials)
+    starts = [
+        pd.DataFrame(trial.values[:START, :, 0])
+        for trial in trials
         if len(trial.t) >= START
-    }
+    ]
     if not starts:
         return
-    frames = pd.concat(starts)
+    frames = pd.concat(starts, keys=range(len(starts)))
     by_trial = frames.groupby(level=0)
-    of_trials = by_trial.median()
-    rest = of_trials.median()
+    medians = by_trial.median()
+    rest = medians.median()
     level = float(rest.median())
     noise = (frames - by_trial.transform("median")).abs().median()
-    drift = (of_trials - rest).abs().median()
+    drift = (medians - rest).abs().median()
     steady = (noise < NOISE * rest) & (drift < DRIFT * rest)
     base = rest.to_numpy()[:, None]
-    rise = _rise(trial.values[..., :1] - base for trial in trials)
-    fall = _rise(base - trial.values[..., :1] for trial in trials)
-    whole = np.array_equal(frames, np.rint(frames), equal_nan=True)
-    least = LEAST_REST if whole else 0.0
+    rise = _highest(trial.values[..., :1] - base for trial in trials)
+    fall = _highest(base - trial.values[..., :1] for trial in trials)
+    is_whole = np.array_equal(frames, np.rint(frames), equal_nan=True)
+    least = LEAST_REST if is_whole else 0.0
     if steady.mean() < 0.5 or level <= max(least, max(rise, fall) / OFFSET):
         return
     option = "--falls" if fall > 2.0 * rise else "--signed"
@@ -277,67 +270,72 @@ def _require_rest_at_zero(trials: Sequence[Samples]) -> None:
     )
 
 
-def _rise(deviations: Iterable[NDArray[np.float64]]) -> float:
-    """The largest of some deviations that are not missing; 0 where all are below."""
-    highest = [np.fmax.reduce(d, axis=None, initial=0.0) for d in deviations]
-    return float(max(highest))
+def _highest(parts: Iterable[NDArray[np.float64]]) -> float:
+    """The highest of some values that are not missing; 0 where all are below."""
+    return float(max(np.fmax.reduce(part, axis=None, initial=0.0) for part in parts))
 
 
 def _moved(trials: Sequence[Samples], options: ValueOptions) -> Rest:
     """How values become counts that are told from those at rest; says which are lost."""
     rest = Rest(_quietest(trials, options), options.falls, options.scale)
-    rise = _rise(trial.values - rest.base for trial in trials)
+    rise = _highest(_deviations(trials, rest))
     if options.falls and rise > 0.0:
         say(f"values above those at rest, by up to {rise:g}, count as 0; see --signed")
     if rest.scale != 1.0:
         return rest
-    return replace(rest, scale=_finest(trial.values - rest.base for trial in trials))
+    return replace(rest, scale=_finest(_deviations(trials, rest)))
+
+
+def _deviations(
+    trials: Iterable[Samples], rest: Rest, codes: Sequence[float] = ()
+) -> Iterator[NDArray[np.float64]]:
+    """How far the values of each trial are from those at rest; NaN for codes."""
+    for trial in trials:
+        yield np.where(np.isin(trial.values, codes), math.nan, trial.values - rest.base)
 
 
 def _lacking(trials: Sequence[Samples], rest: Rest, codes: Sequence[float]) -> str:
     """The options by which the values of some trials would be counts."""
     words = [f"--missing {code:g}" for code in codes]
-    values = [
-        np.where(np.isin(trial.values, codes), math.nan, trial.values - rest.base)
-        for trial in trials
-    ]
-    finest = _finest(values)
-    if rest.values is None and _rise(-v[..., 0] for v in values) > 0.0:
+    finest = _finest(_deviations(trials, rest, codes))
+    fall = _highest(-values[..., 0] for values in _deviations(trials, rest, codes))
+    if rest.values is None and fall > 0.0:
         words.append("--signed")
     elif finest != rest.scale:
         words.append(f"--scale {finest:g}")
     return " ".join(words)
 
 
-def _say_missing(trials: Sequence[Samples], stand_in: float | None) -> list[float]:
+def _say_missing(trials: Sequence[Samples], codes: Sequence[float]) -> list[float]:
     """Take away the values that stand for missing ones, and say how many are missing;
     the numbers that stand alone as such values do, which it says too."""
     missing = 0
+    tails = []
     for trial in trials:
-        trial.values[trial.values == stand_in] = math.nan
-        missing += int((~np.isfinite(trial.values)).any(axis=2).sum())
+        trial.values[np.isin(trial.values, codes)] = math.nan
+        finite = np.isfinite(trial.values)
+        missing += int((~finite).any(axis=2).sum())
+        distinct = np.unique(trial.values[..., 0][finite[..., 0]])
+        tails += [distinct[:TAIL], distinct[-TAIL:]]
     if missing:
         say(
             f"missing: {counted(missing, 'value')}, where a taxel is not valid in its "
             "frame"
         )
-    values = np.concatenate([trial.values[..., 0].ravel() for trial in trials])
-    values = values[np.isfinite(values)]
-    codes = []
-    lowest = float(values.min(initial=0.0))
-    for code in (*CODES, lowest if lowest.is_integer() else 0.0):
+    values = np.unique(np.concatenate(tails))
+    alone = []
+    for code in (*CODES, math.floor(values.min(initial=0.0))):
         others = values[values != code]
-        count = len(values) - len(others)
-        if not count or not others.size:
+        if len(others) in (0, len(values)):
             continue
-        if code < 0.0 <= others.min() or code - others.max() > np.ptp(others):
+        if code < 0.0 <= others[0] or code - others[-1] > np.ptp(others):
             say(
-                f"{code:g} is far from all other values ({counted(count, 'value')}); if "
-                f"it means a missing one, give --missing {code:g}"
+                f"{code:g} is far from all other values; if it means a missing one, give "
+                f"--missing {code:g}"
             )
-            codes.append(code)
+            alone.append(float(code))
             values = others
-    return codes
+    return alone
 
 
 def _quietest(trials: Sequence[Samples], options: ValueOptions) -> NDArray[np.float64]:
@@ -346,11 +344,11 @@ def _quietest(trials: Sequence[Samples], options: ValueOptions) -> NDArray[np.fl
     normal = pd.DataFrame(starts[..., 0])
     usual = normal.median() if options.signed else normal.max()
     unrest = (normal - usual).abs().sum(axis=1)
-    unknown = ~np.isfinite(starts).all(axis=2)
-    first = np.lexsort([unrest, unknown.sum(axis=1)])[0]
-    lost = int(unknown[first].sum())
-    if lost:
-        say(f"{counted(lost, 'taxel')} without a value at rest, which is never valid")
+    lacks_value = ~np.isfinite(starts).all(axis=2)
+    first = np.lexsort([unrest, lacks_value.sum(axis=1)])[0]
+    count = int(lacks_value[first].sum())
+    if count:
+        say(f"{counted(count, 'taxel')} without a value at rest, which is never valid")
     return np.asarray(starts[first])
 
 
@@ -360,15 +358,13 @@ def _finest(deviations: Iterable[NDArray[np.float64]]) -> float:
     errors = np.zeros(len(scales))
     most = np.inf
     for d in deviations:
-        largest = max(
-            _largest(d[..., :1]), _largest(d[..., 1:]) * MOST_COUNTS / MOST_SHEAR
-        )
+        shear = _largest(d[..., 1:]) * MOST_COUNTS / MOST_SHEAR
+        largest = max(_largest(d[..., :1]), shear)
         most = min(most, MOST_COUNTS / largest) if largest else most
         # Values that a scale makes too large are not multiplied by it.
-        fitting = scales <= most
-        scales = scales[fitting]
+        scales = scales[scales <= most]
         differences = [_largest(d * s - np.rint(d * s)) for s in scales]
-        errors = np.fmax(errors[fitting], differences)
+        errors = np.fmax(errors[: len(scales)], differences)
     suit = errors < 1e-6 * scales
     return float(scales[suit.argmax()]) if suit.any() else float(most)
 

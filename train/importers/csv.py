@@ -18,7 +18,7 @@ files are those of train/importers/forms.
 
 import argparse
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from statistics import mode
@@ -33,6 +33,7 @@ from edge.errors import InputError
 from edge.record.labels import TABLE
 from edge.touch.arm import Chain
 from edge.touch.layout import RELEASE_S
+from train.data.scratch import Scratch
 from train.importers import Refused, Trial, clock
 from train.importers.axes import parted
 from train.importers.columns import Meaning, meaning, onsets_of, quoted, times_of
@@ -85,26 +86,41 @@ def trials(
 ) -> Iterator[Trial | Refused]:
     """One recording for each file of a folder, or for each trial of a long table.
 
-    Prints the columns used and ignored.
+    Prints the columns used and ignored. The numbers of trials wait in temporary files
+    until all tables were looked at.
 
     Raises:
-        InputError: there is no file.
+        InputError: there is no file, or most lack an option.
     """
     options = TableOptions.of(arguments)
     folder = path if path.is_dir() else path.parent
-    files = _files(path, options)
+    scratch = Scratch()
     measured: list[Measured] = []
-    for file in files:
+    for file in _files(path, options):
         for result in _tried(_measured(file, folder, options)):
-            if isinstance(result, Measured):
-                measured.append(result)
-            else:
+            if isinstance(result, Refused):
                 yield result
-    if measured:
-        yield from _recorded(folder, path.name, arm, measured, options)
-    elif files:
+                continue
+            samples = scratch.put_fields(result.samples)
+            measured.append(replace(result, samples=samples))
+    if not measured:
         for line in PANDAS.splitlines():
             say(line)
+        return
+    kind = mode(trial.meaning.kind for trial in measured)
+    yield from _odd(measured, kind)
+    alike = [trial for trial in measured if trial.meaning.kind == kind]
+    yield from _recorded(path, folder, arm, alike, options)
+
+
+def _odd(trials: Sequence[Measured], kind: str) -> Iterator[Refused]:
+    """Why trials whose columns are not those of most are left out."""
+    for trial in trials:
+        if trial.meaning.kind != kind:
+            yield Refused(
+                f"{trial.samples.where}: has {trial.meaning.kind:.80}, and most have "
+                f"{kind:.80}; see --taxels and --time-unit"
+            )
 
 
 def _tried(items: Iterator[Any]) -> Iterator[Any]:
@@ -129,8 +145,7 @@ def _files(path: Path, options: TableOptions) -> list[Path]:
         if not any(part.startswith(".") for part in place.relative_to(path).parts)
     ]
     is_trial = _has_files if options.frames else _may_be_table
-    files = list(filter(is_trial, visible))
-    if files:
+    if files := list(filter(is_trial, visible)):
         return files
     for place in visible:
         if place.suffix.lower() in unread.KINDS:
@@ -166,20 +181,20 @@ def _measured(path: Path, folder: Path, options: TableOptions) -> Iterator[Any]:
 
 def _understood(table: Table, place: Path, options: TableOptions) -> Measured:
     """The numbers of a trial."""
-    axes = options.axes
-    normal = table if axes is None else parted(table, axes.normal)
-    sense = meaning(normal, options)
-    t = times_of(normal, sense, options)
-    samples = Samples.of(table.where, t, normal.values(sense.taxels), axes)
+    where = table.where
+    texts = texts_in(table)
+    if options.axes is not None:
+        table = parted(table)
+    sense = meaning(table, options)
+    t = times_of(table, sense, options)
+    samples = Samples.of(where, t, table.values(sense.taxels), options.axes)
     if np.isnan(samples.values[..., 0]).all():
-        raise InputError(f"{table.where}: none of its values is a finite number")
+        raise InputError(f"{where}: none of its values is a finite number")
     onsets = onsets_of(table, options, t)
     rows = table.data.index
     if sense.joints:
-        angles = _radians(normal, sense.joints, options)
+        angles = _radians(table, sense.joints, options)
         samples, rows = _with_joints(samples, rows, angles)
-    texts = texts_in(table)
-    # Without the table, which would fill the memory a second time where it is long.
     return Measured(
         Place(table.name, place, table.labels, table.label, texts),
         table.form,
@@ -195,16 +210,16 @@ def _radians(
     """(rows, joints) angles.
 
     Raises:
-        InputError: they are beyond a turn, and nothing says that they are in radians.
+        InputError: they are beyond a turn, and nothing says that they are in degrees.
     """
     angles = table.numbers(joints)
     if options.degrees:
         return np.radians(angles)
     largest = np.fmax.reduce(np.abs(angles), axis=None, initial=0.0)
-    if largest > 2.0 * math.pi and not options.radians:
+    if largest > 2.0 * math.pi:
         raise InputError(
-            f"{table.where}: joint angles reach {largest:g}, beyond 2 pi: they are in "
-            "degrees (--degrees), or no angles (see --joints), or --radians of many turns"
+            f"{table.where}: joint angles reach {largest:g}, beyond 2 pi: add --degrees, "
+            "or name other columns by --joints"
         )
     return angles
 
@@ -215,64 +230,58 @@ def _with_joints(
     """The frames and their rows, with joint angles that may stand in rows of their
     own."""
     where = samples.where
-    known = np.isfinite(angles).all(axis=1)
-    if known.all() or not known.any():
+    has_angles = np.isfinite(angles).all(axis=1)
+    if has_angles.all() or not has_angles.any():
         return replace(samples, joints=clock.complete(angles, where)), rows
-    felt = np.isfinite(samples.values).any(axis=(1, 2))
-    t = samples.t[felt]
+    has_values = np.isfinite(samples.values).any(axis=(1, 2))
+    t = samples.t[has_values]
+    frame = str(rows.name)
     at_frames = clock.angles_at(
         t,
-        samples.t[known],
-        angles[known],
+        samples.t[has_angles],
+        angles[has_angles],
         RELEASE_S,
         where,
-        str(rows.name),
-        rows[known],
+        frame,
+        rows[has_angles],
     )
     joints = clock.complete(at_frames, where)
-    return Samples(where, t, samples.values[felt], joints), rows[felt]
+    return Samples(where, t, samples.values[has_values], joints), rows[has_values]
 
 
 def _recorded(
+    path: Path,
     folder: Path,
-    source: str,
     arm: Chain | None,
-    measured: Sequence[Measured],
+    trials: Sequence[Measured],
     options: TableOptions,
 ) -> Iterator[Trial | Refused]:
-    """The recordings of trials, without those whose columns are not those of most of
-    them; prints the columns used and ignored."""
-    kind = mode(trial.meaning.kind for trial in measured)
-    usable = [trial for trial in measured if trial.meaning.kind == kind]
-    others = [_name(place.relative_to(folder)) for place in folder.rglob("*")]
-    labels = labels_of([trial.place for trial in measured], folder, options, others)
+    """The recordings of trials of the same columns; prints the columns used and
+    ignored."""
+    names = [_name(place.relative_to(folder)) for place in folder.rglob("*")]
+    labels = labels_of([trial.place for trial in trials], folder, options, names)
     yield from map(Refused, labels.slips)
     skin = json_table(folder / SKIN)
-    if usable[0].meaning.are_all:
-        _require_taxels(usable)
-    shape = _announced(usable, skin, labels, options)
+    samples = [trial.samples for trial in trials]
+    if trials[0].meaning.are_all:
+        _require_taxels(samples, trials[0].meaning.taxels)
+    shape = _announced(trials, skin, labels, options)
     # What is cut at contact has no rest.
-    values = replace(options, counts=True) if options.onset else options
-    rest = rest_of([trial.samples for trial in usable], values)
-
-    def recorded(trial: Measured, labels: Mapping[str, str]) -> Trial:
-        if trial.meaning.kind != kind:
-            raise InputError(
-                f"{trial.samples.where}: has {trial.meaning.kind:.80}, and most have "
-                f"{kind:.80}; see --taxels and --time-unit"
-            )
-        meta = _meta(trial, arm, options)
-        meta |= {"skin": skin.raw, "labels": dict(labels), "source": source}
-        return Trial(trial.place.name, rest.recording(trial.samples, shape, meta))
-
-    for trial, trial_labels in zip(measured, labels.of, strict=True):
-        if trial.place.name not in labels.left_out:
-            yield from _tried(map(recorded, [trial], [trial_labels]))
+    counts = options.counts or options.onset is not None
+    rest = rest_of(samples, replace(options, counts=counts))
+    common = {"skin": skin.raw, "source": path.name}
+    for trial, trial_labels in zip(trials, labels.of, strict=True):
+        name = trial.place.name
+        meta = common | {"trial": name, "labels": dict(trial_labels)}
+        meta |= _meta(trial, arm, options)
+        if name not in labels.left_out:
+            recordings = map(rest.recording, [trial.samples], [shape], [meta])
+            yield from _tried(map(Trial, [name], recordings))
 
 
 def _meta(trial: Measured, arm: Chain | None, options: TableOptions) -> dict[str, Any]:
-    """What a recording says of a trial beside its skin and labels."""
-    meta: dict[str, Any] = {"trial": trial.place.name}
+    """What a recording says of its arm and its onsets."""
+    meta: dict[str, Any] = {}
     if trial.samples.joints is not None:
         meta["arm"] = arm and arm.to_dict()
     if options.onset or options.onset_column:
@@ -282,25 +291,25 @@ def _meta(trial: Measured, arm: Chain | None, options: TableOptions) -> dict[str
 
 
 def _announced(
-    usable: Sequence[Measured],
+    trials: Sequence[Measured],
     skin: ConfigTable,
     labels: Labels,
     options: TableOptions,
 ) -> tuple[int, int]:
     """The rows and columns of the skin; prints the columns used and ignored, once for
     all files."""
-    first = usable[0]
+    first = trials[0]
     taxels = len(first.meaning.taxels)
     in_skin = skin.whole("rows", 1), skin.whole("cols", taxels)
     shape = skin_shape(first.samples, first.meaning.shape or in_skin, options)
     ignored = [name for name in first.meaning.left_out if name not in labels.columns]
-    parts = [f"{first.meaning.text(shape)}, label: {labels.source}"]
+    phrases = [f"{first.meaning.text(shape)}, label: {labels.source}"]
     if ignored:
-        parts.append(f"ignored: {', '.join(map(quoted, ignored))}")
+        phrases.append(f"ignored: {', '.join(map(quoted, ignored))}")
     if options.onset_column:
-        count = sum(len(trial.onsets) for trial in usable)
-        parts.append(f"onset: column {options.onset_column}, {count} times")
-    say("; ".join([*parts, *first.form]))
+        count = sum(len(trial.onsets) for trial in trials)
+        phrases.append(f"onset: column {options.onset_column}, {count} times")
+    say("; ".join([*phrases, *first.form]))
     if options.axes is not None:
         say(options.axes.text)
     if labels.warning:
@@ -308,23 +317,25 @@ def _announced(
     return shape
 
 
-def _require_taxels(measured: Sequence[Measured]) -> None:
+def _require_taxels(trials: Sequence[Samples], taxels: Sequence[str]) -> None:
     """Refuse columns without a name of which some count the rows or time, or tell the
     trials apart.
 
     Raises:
         InputError: there is one.
     """
-    values = [pd.DataFrame(trial.samples.values[..., 0]) for trial in measured]
-    if min(map(len, values)) < FEWEST_ROWS:
+    if min(len(trial.t) for trial in trials) < FEWEST_ROWS:
         return
-    trials = pd.concat(values, keys=range(len(values))).groupby(level=0)
-    steps = trials.diff().dropna()
-    tells_apart = trials.first().nunique() > 1
-    doubtful = (steps > 0.0).all() | ((steps == 0.0).all() & tells_apart)
-    if doubtful.any() and not doubtful.all():
-        first = measured[0]
+    steps = [np.diff(trial.values[..., 0], axis=0) for trial in trials]
+    rises = np.all([(step > 0.0).all(axis=0) for step in steps], axis=0)
+    stays = np.all([(step == 0.0).all(axis=0) for step in steps], axis=0)
+    starts = [trial.values[0, :, 0] for trial in trials]
+    doubtful = rises | (stays & (np.ptp(starts, axis=0) > 0.0))
+    likely = [
+        taxel for taxel, is_odd in zip(taxels, doubtful, strict=True) if not is_odd
+    ]
+    if doubtful.any() and likely:
         raise InputError(
-            f"{first.samples.where}: column {first.meaning.taxels[doubtful.argmax()]} "
-            "counts up, or tells the trials apart; name the taxels by --taxels"
+            f"{trials[0].where}: column {taxels[doubtful.argmax()]} counts up, or tells "
+            f"the trials apart; name the taxels, such as --taxels {','.join(likely)}"
         )

@@ -2,6 +2,7 @@
 
 import argparse
 import re
+from collections.abc import Sequence
 from dataclasses import dataclass, fields
 from itertools import permutations
 from typing import Self
@@ -58,7 +59,13 @@ def add_value_options(parser: argparse.ArgumentParser) -> None:
         default=1.0,
         help="counts in a unit of values with fractions",
     )
-    add("--missing", type=float, metavar="VALUE", help="stands for a missing value")
+    add(
+        "--missing",
+        type=float,
+        action="append",
+        metavar="VALUE",
+        help="stands for a missing value; may be given again",
+    )
     add(
         "--axes",
         type=str.lower,
@@ -79,7 +86,8 @@ def add_value_options(parser: argparse.ArgumentParser) -> None:
 def add_table_options(parser: argparse.ArgumentParser) -> None:
     """Add options for the facts that a table lacks."""
     add = parser.add_argument
-    add(
+    time = parser.add_mutually_exclusive_group().add_argument
+    time(
         "--rate",
         # A higher rate must be a mistake.
         type=within(float, 1e-3, 1e6),
@@ -97,7 +105,7 @@ def add_table_options(parser: argparse.ArgumentParser) -> None:
         action="store_true",
         help="a file of arrays holds several trials: cells, structures, or a first axis",
     )
-    add("--time", metavar="COL", help="the time (default: a column of such a name)")
+    time("--time", metavar="COL", help="the time (default: a column of such a name)")
     add(
         "--time-unit",
         choices=(*UNITS_S, "iso"),
@@ -105,13 +113,7 @@ def add_table_options(parser: argparse.ArgumentParser) -> None:
     )
     add("--taxels", metavar="COLS", help="the taxels (default: by running numbers)")
     add("--joints", metavar="COLS", help="joint angles in radians")
-    angle = parser.add_mutually_exclusive_group().add_argument
-    angle("--degrees", action="store_true", help="joint angles are in degrees")
-    angle(
-        "--radians",
-        action="store_true",
-        help="joint angles are in radians, though beyond 2 pi",
-    )
+    add("--degrees", action="store_true", help="joint angles are in degrees")
     onset = parser.add_mutually_exclusive_group().add_argument
     onset(
         "--onset-column",
@@ -148,7 +150,7 @@ class ValueOptions:
     signed: bool = False
     counts: bool = False
     scale: float = 1.0
-    missing: float | None = None
+    missing: Sequence[float] | None = None
     axes: Axes | None = None
 
     @classmethod
@@ -175,7 +177,6 @@ class TableOptions(ValueOptions):
     taxels: str | None = None
     joints: str | None = None
     degrees: bool = False
-    radians: bool = False
     onset_column: str | None = None
     onset: str | None = None
     label: str | None = None

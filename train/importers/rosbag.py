@@ -5,12 +5,11 @@ Needs the dependency group `ros`, which `make venv` installs: pip install --grou
 """
 
 import argparse
-import io
 import os
+import re
 import sys
 from collections.abc import Iterator
 from pathlib import Path
-from typing import BinaryIO
 
 from edge.errors import InputError
 from edge.files import open_regular, parsing
@@ -22,14 +21,14 @@ from train.importers.topics import Log
 from train.importers.topics import add_options as add_options
 
 MAGIC = b"\x89MCAP0\r\n"
-HEADER = 1
-FOOTER_RECORD = 2
-SCHEMA = 3
-CHANNEL = 4
-LARGEST_RECORD = 1 << 24
-LARGEST_FILE = 1 << 48
-FOOTER = 37
-"""Bytes of the last record and of the magic behind it."""
+PROFILE = b"\4\0\0\0ros2"
+"""What stands behind the magic, a code and a length in a file of ROS 2."""
+OTHERS = re.compile(
+    rb"([\w./:-]+)[\1-\x20]\0\0\0(protobuf|flatbuffer|jsonschema|ros1msg)"
+)
+"""A schema's name and its encoding, each behind its length (https://mcap.dev/spec)."""
+LOOKED_AT = 1 << 20
+"""Bytes at each end of a file, where its schemas stand."""
 
 
 def trials(
@@ -60,25 +59,20 @@ def trials(
 
 
 def _require_messages_of_ros(path: Path) -> None:
-    """Refuse an MCAP file whose messages are not those of ROS 2, whose files name
-    themselves; one that is damaged is left to its reader.
+    """Refuse an MCAP file whose messages are not those of ROS 2; one that is damaged is
+    left to its reader.
 
     Raises:
-        InputError: it is one; the sentence names its encodings and schemas.
+        InputError: it is one; the sentence names an encoding and its schema.
     """
     with open_regular(path, sys.maxsize) as file:  # a FIFO would be waited for
-        if file.read(8) != MAGIC:
-            return
-        profile = next(_records(file), NOTHING)[1].string()
-        file.seek(max(0, file.seek(0, os.SEEK_END) - FOOTER))
-        footer = Content(file.read(FOOTER))
-        if len(footer.getvalue()) < FOOTER or not footer.getvalue().endswith(MAGIC):
-            return
-        footer.seek(9)
-        file.seek(min(footer.number(8), LARGEST_FILE) or len(MAGIC))
-        others = _other_encodings(file)
-    if others or profile != "ros2":
-        kinds = [f"{encoding} ({of})" for encoding, of in others.items()]
+        start = file.read(LOOKED_AT)
+        file.seek(max(0, file.seek(0, os.SEEK_END) - LOOKED_AT))
+        end = file.read()
+    if not (start.startswith(MAGIC) and end[len(MAGIC) :].endswith(MAGIC)):
+        return
+    kinds = [f"{encoding} ({name})" for name, encoding in _others(start + end).items()]
+    if kinds or start[17:25] != PROFILE:
         raise InputError(
             f"{path}: its messages are {', '.join(kinds) or 'of another profile'}, which "
             "are not read; write the values as a table, for `import csv` (in Python the "
@@ -86,45 +80,6 @@ def _require_messages_of_ros(path: Path) -> None:
         )
 
 
-def _other_encodings(file: BinaryIO) -> dict[str, str]:
-    """{encoding: a schema and its topic} of channels, but for that of ROS 2."""
-    schemas = {0: "no schema"}
-    others = {}
-    for code, content in _records(file):
-        number = content.number(2)
-        if code == SCHEMA:
-            schemas[number] = content.string()
-        elif code == CHANNEL:
-            schema = schemas.get(content.number(2), schemas[0])
-            topic = content.string()
-            encoding = content.string()
-            if encoding != "cdr":
-                others[encoding] = f"{schema} on {topic}"
-    return others
-
-
-class Content(io.BytesIO):
-    """The content of a record of MCAP (https://mcap.dev/spec)."""
-
-    def number(self, size: int) -> int:
-        """A whole number of some bytes."""
-        return int.from_bytes(self.read(size), "little")
-
-    def string(self) -> str:
-        """A text behind its length."""
-        return self.read(self.number(4)).decode(errors="replace")
-
-
-NOTHING = (0, Content())
-
-
-def _records(file: BinaryIO) -> Iterator[tuple[int, Content]]:
-    """The records of an MCAP file from where it stands to its footer."""
-    while code := int.from_bytes(file.read(1), "little"):
-        size = int.from_bytes(file.read(8), "little")
-        if code in (HEADER, SCHEMA, CHANNEL):
-            yield code, Content(file.read(min(size, LARGEST_RECORD)))
-        elif code == FOOTER_RECORD or size > LARGEST_FILE - file.tell():
-            return
-        else:
-            file.seek(size, os.SEEK_CUR)
+def _others(data: bytes) -> dict[str, str]:
+    """{schema: encoding} of those that are not of ROS 2."""
+    return {name.decode(): code.decode() for name, code in OTHERS.findall(data)}

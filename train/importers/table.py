@@ -32,6 +32,8 @@ class Table:
         units: {column: unit} where the file has a row of them.
         labels: {task: label} that the file tells.
         label: where they stand in it; empty where it tells none.
+        axes: columns of taxels of three axes: a row for each taxel, a column for each
+            letter; None where a taxel has one column.
     """
 
     where: str
@@ -44,6 +46,7 @@ class Table:
     units: Mapping[str, str] = field(default_factory=dict)
     labels: Mapping[str, str] = field(default_factory=dict)
     label: str = ""
+    axes: pd.DataFrame | None = None
 
     def __post_init__(self) -> None:
         if self.data.empty:
@@ -53,13 +56,19 @@ class Table:
 
     @property
     def names(self) -> list[str]:
-        """The names of the columns, as they stand."""
-        return list(self.data.columns)
+        """The names of the columns, as they stand, and of taxels of three axes."""
+        if self.axes is None:
+            return list(self.data.columns)
+        plain = self.data.columns.drop(self.axes.to_numpy().ravel())
+        return [*self.axes.index, *plain]
 
-    @property
-    def candidates(self) -> list[str]:
-        """The names of the columns that may be taxels."""
-        return self.names
+    def candidates(self, names: Sequence[str]) -> list[str]:
+        """Those of some names that may be taxels."""
+        if self.axes is not None:
+            return [name for name in names if name in self.axes.index]
+        numbers = self.data.select_dtypes(["number", "bool"]).columns
+        is_any = self.named or not numbers.size
+        return [name for name in names if is_any or name in numbers]
 
     @property
     def arrays(self) -> dict[str, list[str]]:
@@ -69,11 +78,23 @@ class Table:
             arrays[name.rpartition(".")[0]].append(name)
         return arrays
 
-    def numbers(self, names: Sequence[str]) -> NDArray[np.float64]:
+    def numbers(self, names: Iterable[str]) -> NDArray[np.float64]:
         """(rows, names) the numbers of some columns, as `numbers_of`."""
         return np.column_stack([numbers_of(self, name) for name in names])
 
-    values = numbers
+    def values(self, names: Sequence[str]) -> NDArray[np.float64]:
+        """(rows, taxels) values of some taxels, or (rows, taxels, 3) x, y and z.
+
+        Raises:
+            InputError: one of them has one axis alone, or a cell is no number.
+        """
+        if self.axes is None:
+            return self.numbers(names)
+        for name in names:
+            if name not in self.axes.index:
+                raise InputError(f"{self.where}: taxel {name} has one axis alone")
+        columns = self.axes.loc[list(names)].to_numpy()
+        return self.numbers(columns.ravel()).reshape(-1, *columns.shape)
 
 
 @contextmanager
@@ -105,7 +126,7 @@ def numbers_of(table: Table, name: str) -> pd.Series:
     """
     column = table.data[name]
     if not pd.api.types.is_numeric_dtype(column):
-        column = column.astype(object).replace(",", ".", regex=True)
+        column = column.astype(str).str.replace(",", ".")
     numbers = pd.to_numeric(column, errors="coerce").astype("float64")
     numbers = numbers.where(np.isfinite(numbers))
     require_converted(table, name, numbers, "no number")
@@ -137,17 +158,3 @@ def require_unique(names: Iterable[str]) -> None:
     for name, count in Counter(names).items():
         if count > 1:
             raise InputError(f"two columns are named {name}; rename one of them")
-
-
-def require_filled(table: Table, name: str) -> None:
-    """Refuse a table with an empty cell in a column that tells its rows apart.
-
-    Raises:
-        InputError: a cell is empty; the sentence names its line.
-    """
-    empty = table.data[name].isna()
-    if empty.any():
-        raise InputError(
-            f"{table.where}: {empty.index.name} {empty.idxmax()} has no {name}; enter "
-            "it, or leave the row out"
-        )

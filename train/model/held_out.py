@@ -19,6 +19,7 @@ from train.model.pipeline import (
     fittable,
     slopes_of,
 )
+from train.model.prototypes import divided
 from train.threads import in_processes, single_thread
 
 AtPoints = Sequence[Choices]
@@ -60,6 +61,7 @@ def held_out(
     runs: Sequence[Sequence[AtPoints]],
     jobs: int = 1,
     heading: str = "",
+    prototypes: Sequence[int] = (),
 ) -> list[HeldOut]:
     """[run] answers to each trial by models without its fold.
 
@@ -75,11 +77,14 @@ def held_out(
         runs: [run][fold][decision point]{task: Choice}.
         jobs: processes.
         heading: of a progress bar on stderr; empty for none.
+        prototypes: [run] most of a set of labels, or 0 where each trial is a row; 0 of
+            all runs where empty.
     """
     settings = [at_points for run in runs for at_points in run]
     slopes = slopes_at_points(settings, vectors, jobs)
+    counts = prototypes or [0] * len(runs)
     work = [
-        delayed(_fold)(vectors, folds == fold, choices, slopes)
+        delayed(_fold)(vectors, folds == fold, choices, slopes, counts)
         for fold, choices in enumerate(zip(*runs, strict=True))
     ]
     by_fold = list(in_processes(jobs, work, heading))
@@ -103,20 +108,29 @@ def _fold(
     left_out: Booleans,
     runs: Sequence[AtPoints],
     slopes: Sequence[Slopes],
+    counts: Sequence[int],
 ) -> list[Answers]:
     """[run] answers to the trials that are left out."""
     y = {task: labels[~left_out] for task, labels in vectors.y.items()}
     models: list[list[ContactClassifier]] = [[] for _ in runs]
     with single_thread():
+        shared: list[Fits] = [{} for _ in vectors.X]
+        prototypes = [
+            divided(vectors, ~left_out, choices, count, shared) if count else None
+            for choices, count in zip(runs, counts, strict=True)
+        ]
         # A decision point at a time, as all together take much memory.
         for point, x in enumerate(vectors.X):
-            training = replace(vectors, X=x[~left_out], y=y)
-            fits: Fits = {}
-            for models_of_run, choices in zip(models, runs, strict=True):
+            outside = x[~left_out]
+            for run, choices in enumerate(runs):
+                training = replace(vectors, X=outside, y=y, prototypes=prototypes[run])
                 possible = fittable(choices[point], y)
-                models_of_run.append(
-                    ContactClassifier.of(possible, training, fits, slopes[point])
+                models[run].append(
+                    ContactClassifier.of(
+                        possible, training, shared[point], slopes[point]
+                    )
                 )
+            shared[point].clear()
         return [answers(of_run, vectors.X[:, left_out]) for of_run in models]
 
 

@@ -37,7 +37,8 @@ from scipy.spatial.distance import cdist
 
 from edge.arrays import Booleans, Floats, Integers
 from edge.features.names import feature
-from train.data.vectors import Strings, Vectors, blocks
+from train.data.folds import representative
+from train.data.vectors import MOST_ROWS, Strings, Vectors, blocks
 from train.threads import in_processes, single_thread
 
 UNUSUAL_RATE = 0.01
@@ -87,7 +88,8 @@ class NoveltyPoint:
         whitening: (components, components) whole numbers; a coordinate is the sum of
             products divided by 2^`shift`.
         shift: power of two.
-        rows: (n, components) whole coordinates of the training trials.
+        rows: (n, components) whole coordinates of the training trials, or of as many of
+            each label as its share is.
         weights: (components,) of coordinates in remoteness: 1 for discriminants, and
             `BESIDE`.
         nearness, weighted_nearness: (n,) by which squared distances to the rows are
@@ -153,6 +155,7 @@ class NoveltySpace:
             trials: (n,) mask of those that it is the space of.
         """
         labels = labels[trials]
+        compared = representative({"": labels}, MOST_ROWS)
         scales = [_scale(x[trials], widths, least) for x in X]
         # A decision point at a time, as all together take much memory.
         steps = partial(map, lambda x, scale: _steps(x[trials], *scale), X, scales)
@@ -166,7 +169,7 @@ class NoveltySpace:
         points = []
         for scale, of_point in zip(scales, steps(), strict=True):
             z = _product(of_point, weights, shift)
-            points.append(_point(*scale, z, labels))
+            points.append(_point(*scale, z, labels, compared))
         return cls(weights, shift, tuple(points))
 
     def scores(self, X: Floats) -> Scores:
@@ -285,8 +288,11 @@ def _coordinates(z: Floats, whitening: Floats, shift: int) -> Floats:
     return np.asarray(np.clip(integers, -FARTHEST, FARTHEST))
 
 
-def _point(mean: Floats, gain: Floats, z: Floats, labels: Strings) -> NoveltyPoint:
-    """The constants of a decision point at which trials have the components z."""
+def _point(
+    mean: Floats, gain: Floats, z: Floats, labels: Strings, compared: Integers
+) -> NoveltyPoint:
+    """The constants of a decision point at which trials have the components z, of which
+    some are compared with others."""
     names, classes = np.unique(labels, return_inverse=True)
     means = np.stack([z[classes == i].mean(axis=0) for i in range(len(names))])
     within = z - means[classes]
@@ -303,7 +309,8 @@ def _point(mean: Floats, gain: Floats, z: Floats, labels: Strings) -> NoveltyPoi
     fine = _shift(whitening, WHITENING_BITS)
     integers = np.rint(np.ldexp(whitening, fine))
     shift = fine - _shift(z @ whitening, STORED_BITS - 1)
-    rows = _coordinates(z, integers, shift)
+    rows = _coordinates(z[compared], integers, shift)
+    labels = labels[compared]
     nearness = _nearness(rows, labels)
     weighted = _nearness(rows * weights, labels)
     return NoveltyPoint(mean, gain, integers, shift, rows, weights, nearness, weighted)

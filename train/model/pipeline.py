@@ -52,6 +52,7 @@ def nearest_of_label(sizes: Integers) -> Integers:
 
     A label with fewer than three trials is represented by all of them. With a share
     rather than a number, a label's distance does not shrink as its trials become more.
+    Of prototypes, which do not become more, the nearest alone stands for a label.
     """
     return np.minimum(sizes, np.maximum(-(-sizes // LABEL_SHARE), NEAREST_OF_LABEL))
 
@@ -59,17 +60,16 @@ def nearest_of_label(sizes: Integers) -> Integers:
 def label_distances(
     squares: Floats,
     labels: Integers,
-    classes: int,
+    counts: Integers,
     unit: float,
 ) -> Floats:
-    """(m, classes) distance of each label, from squared distances (m, n) to the trials.
+    """(m, classes) distance of each label, from squared distances (m, n) to the rows.
 
-    It is the mean distance of the label's nearest trials; `nearest_of_label` says of
-    how many. Distances are rounded to the unit of the grid first. So their sum is a
-    whole number of units far below 2^53, which every order of summation gives.
+    It is the mean distance of so many of the label's nearest rows. Distances are
+    rounded to the unit of the grid first. So their sum is a whole number of units far
+    below 2^53, which every order of summation gives.
     """
-    counts = nearest_of_label(np.bincount(labels, minlength=classes))
-    out = np.empty((len(squares), classes))
+    out = np.empty((len(squares), len(counts)))
     for label, count in enumerate(counts):
         nearest = np.sort(squares[:, labels == label], axis=1)[:, :count]
         wholes = np.rint(np.sqrt(nearest) / unit)
@@ -183,18 +183,21 @@ class TaskAnswers(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class FittedSpace:
-    """A projection of the vectors, with the trials that tasks compare in it.
+    """A projection of the vectors, with the rows that tasks compare in it.
 
     Attributes:
         columns: of the vectors, that it takes, rising.
         projection: with the components of the task that has most.
-        members: (m,) the trials that it was fitted on, rising.
-        rows: (m, c) these trials, projected.
+        members: (m,) numbers of the rows among those of a model, rising: the trials that
+            it was fitted on, or their prototypes.
+        trials: (m,) the trial next to each row.
+        rows: (m, c) these trials, projected, or the means of the prototypes' trials.
     """
 
     columns: Integers
     projection: Projection
     members: Integers
+    trials: Integers
     rows: Floats
 
     def project(self, X: Floats) -> Floats:
@@ -209,7 +212,8 @@ class FittedTask:
     Attributes:
         space: that tasks of equal settings share.
         classes: the labels, sorted.
-        labels: (m,) class indices of the space's trials.
+        labels: (m,) class indices of the space's rows.
+        counts: (classes,) rows that stand for a label, see `nearest_of_label`.
         components: coordinates that count, at most as many as the space has.
         k: neighbours that vote.
         slope: by how much the log odds of a label change with its `label_distances`.
@@ -218,6 +222,7 @@ class FittedTask:
     space: FittedSpace
     classes: Strings
     labels: Integers
+    counts: Integers
     components: int
     k: int
     slope: float = 1.0
@@ -229,11 +234,11 @@ class FittedTask:
 
     @property
     def rows(self) -> Floats:
-        """(m, components) the coordinates of the space's trials."""
+        """(m, components) the coordinates of the space's rows."""
         return self.space.rows[:, : self.components]
 
     def squares(self, X: Floats) -> Floats:
-        """(n, m) squared distances of vectors (n, p) to the space's trials."""
+        """(n, m) squared distances of vectors (n, p) to the space's rows."""
         return squared_distances(self.space.project(X)[:, : self.components], self.rows)
 
     def nearest(self, squares: Floats) -> Integers:
@@ -241,7 +246,7 @@ class FittedTask:
         return np.argsort(squares, axis=1, kind="stable")[:, : self.k]
 
     def neighbours(self, X: Floats) -> tuple[Floats, Integers]:
-        """Distances and training rows (n, k) for vectors (n, p), nearest first."""
+        """Distances and rows of the model (n, k) for vectors (n, p), nearest first."""
         squares = self.squares(X)
         places = self.nearest(squares)
         distances = np.sqrt(np.take_along_axis(squares, places, axis=1))
@@ -249,7 +254,7 @@ class FittedTask:
 
     def to_labels(self, squares: Floats) -> Floats:
         """(n, classes) `label_distances` of squares (n, m)."""
-        return label_distances(squares, self.labels, len(self.classes), self.unit)
+        return label_distances(squares, self.labels, self.counts, self.unit)
 
     def gaps(self, X: Floats, labels: Strings) -> Floats:
         """(n,) by how much nearer than any other the right label is to each of the
@@ -275,7 +280,7 @@ class ContactClassifier:
         widths: columns of each; equal where None.
 
     Attributes:
-        n_trials_: how many there are.
+        n_rows_: how many rows it compares with.
         tasks_: {task: FittedTask}.
         products_: {task: its factors} of the tasks decided together; see
             `edge.decide.agreement`.
@@ -320,19 +325,30 @@ class ContactClassifier:
         vectors = replace(vectors, X=finite(vectors.X))
         if slopes is None:
             slopes = slopes_of([self.choices], vectors)
-        self.n_trials_, self.n_features_in_ = vectors.X.shape
+        self.n_rows_, self.n_features_in_ = vectors.X.shape
+        if vectors.prototypes is not None:
+            self.n_rows_ = int(vectors.prototypes.max()) + 1
         fitted: dict[str, FittedTask] = {}
         for choices in sharing_a_space(self.choices, vectors):
             key = tuple(choices.items())
             if key not in fits:
                 fits[key] = fit_together(choices, vectors)
-            fitted |= fits[key]
+            fitted |= with_prototypes(fits[key], vectors)
         self.tasks_ = {
             task: replace(fitted[task], slope=slopes[task, replace(choice, k=1)])
             for task, choice in self.choices.items()
         }
         self.products_ = factors_of({task: vectors.y[task] for task in self.choices})
         return self
+
+    @property
+    def trials_(self) -> Integers:
+        """(rows,) the training trial next to each row, by the task that has most
+        labels."""
+        trials = np.zeros(self.n_rows_, dtype=np.int64)
+        for fitted in sorted(self.tasks_.values(), key=lambda fit: len(fit.classes)):
+            trials[fitted.space.members] = fitted.space.trials
+        return trials
 
     def decide(self, X: Floats) -> dict[str, TaskAnswers]:
         """{task: decisions} on vectors (m, p), as `edge.Model` makes them of the
@@ -341,7 +357,7 @@ class ContactClassifier:
         distances = {}
         for task, fitted in self.tasks_.items():
             by_block = []
-            for block in blocks(X, self.n_trials_):
+            for block in blocks(X, self.n_rows_):
                 squares = fitted.squares(block)
                 voted = vote(fitted.labels[fitted.nearest(squares)])
                 by_block.append((voted, fitted.to_labels(squares) * fitted.slope))
@@ -401,13 +417,46 @@ def _fit_space(choices: Choices, vectors: Vectors) -> dict[str, FittedTask]:
     projection.fit(X, np.column_stack(targets))
     columns = np.arange(X.shape[1])
     projected = projection.transform(X)
-    space = FittedSpace(columns, projection, members, projected)
+    space = FittedSpace(columns, projection, members, members, projected)
     fitted = {}
     for task, choice in choices.items():
         classes, labels = np.unique(vectors.y[task][members], return_inverse=True)
         components = min(choice.components, projection.rank_)
-        fitted[task] = FittedTask(space, classes, labels, components, choice.k)
+        counts = nearest_of_label(np.bincount(labels))
+        fitted[task] = FittedTask(space, classes, labels, counts, components, choice.k)
     return fitted
+
+
+def with_prototypes(
+    fitted: Mapping[str, FittedTask], vectors: Vectors
+) -> dict[str, FittedTask]:
+    """Tasks that share a space, with the prototypes of the vectors as its rows, where
+    they have some."""
+    if vectors.prototypes is None:
+        return {**fitted}
+    space = next(iter(fitted.values())).space
+    of_trials = vectors.prototypes[space.members]
+    members, first, places = np.unique(
+        of_trials, return_index=True, return_inverse=True
+    )
+    unit = space.projection.grid_.unit
+    sums = [np.bincount(places, column / unit) for column in space.rows.T]
+    means = np.reshape(sums, (-1, len(members))).T / np.bincount(places)[:, None]
+    rows = np.rint(means) * unit
+    away = ((space.rows - rows[places]) ** 2).sum(axis=1)
+    order = np.lexsort((away, places))
+    nearest = order[np.searchsorted(places[order], np.arange(len(members)))]
+    trials = space.members[nearest]
+    condensed = replace(space, members=members, trials=trials, rows=rows)
+    return {
+        task: replace(
+            fit,
+            space=condensed,
+            labels=fit.labels[first],
+            counts=np.ones_like(fit.counts),
+        )
+        for task, fit in fitted.items()
+    }
 
 
 def slopes_of(settings: Iterable[Choices], vectors: Vectors) -> Slopes:
@@ -441,7 +490,8 @@ def _slopes(choices: Choices, vectors: Vectors) -> dict[str, float]:
         possible = fittable(choices, training.y)
         if not possible:
             continue
-        for task, fitted in _fit_space(possible, training).items():
+        fits = with_prototypes(_fit_space(possible, training), training)
+        for task, fitted in fits.items():
             labels = vectors.y[task]
             tested = left_out & np.isin(labels, fitted.classes)
             if len(fitted.classes) > 1:

@@ -69,7 +69,8 @@ from train.model.novelty import (
     least_deviations,
     limits_of,
 )
-from train.model.pipeline import Choices
+from train.model.pipeline import Choices, Fits
+from train.model.prototypes import divided
 from train.model.rules import RISK, TimeSeries, agreeing, candidates, certify
 from train.threads import single_thread
 
@@ -128,6 +129,7 @@ class SequentialClassifier:
         early: settings of early decision points; those of the full window where None.
         drawn: whether a scene drew the trained objects, so that the model is for other
             arms than the scene's.
+        prototypes: most of a set of labels; 0 where each trial is a row of the model.
         heading: of progress bars on stderr; empty for none.
 
     Attributes:
@@ -148,6 +150,7 @@ class SequentialClassifier:
     widths: Sequence[int] | None = None
     early: EarlySettings | None = None
     drawn: bool = False
+    prototypes: int = 0
     heading: str = ""
 
     def fit(
@@ -190,6 +193,7 @@ class SequentialClassifier:
             [of_folds, of_all],
             self.jobs,
             self.heading,
+            [self.prototypes] * 2,
         )
         self.right_ = chosen_without.right
         never_met = self._never_met(inputs)
@@ -221,11 +225,15 @@ class SequentialClassifier:
         self.columns_ = vectors.columns_of(features)
         self.n_features_in_ = len(self.columns_)
         vectors = vectors.of(features)
+        fits: list[Fits] = [{} for _ in vectors.X]
+        if self.prototypes:
+            of_trials = divided(
+                vectors, slice(None), self.choices_at, self.prototypes, fits
+            )
+            vectors = replace(vectors, prototypes=of_trials)
         slopes = slopes_at_points([self.choices_at], vectors, self.jobs)
         with single_thread():
-            self.decision_points_ = at_points(
-                self.choices_at, vectors, [{} for _ in vectors.X], slopes
-            )
+            self.decision_points_ = at_points(self.choices_at, vectors, fits, slopes)
         return vectors
 
     def _fit_novelty(self, vectors: Vectors, folds: Integers) -> None:
@@ -287,7 +295,9 @@ class SequentialClassifier:
             return {}
         at_end = replace(vectors, X=vectors.X[-1:])
         runs = [[self.choices]] * (int(objects.max()) + 1)
-        (answered,) = held_out(at_end, objects, [runs], self.jobs, self.heading)
+        (answered,) = held_out(
+            at_end, objects, [runs], self.jobs, self.heading, [self.prototypes]
+        )
         excess = excess_of(self.novelty_, self._left_out.novelty)[-1]
         evidence = {}
         for task, tested in self._tested.items():

@@ -2,17 +2,18 @@
 candidates."""
 
 import re
+from collections import Counter
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import partial
+from operator import itemgetter
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from sklearn.metrics import precision_recall_fscore_support
 
-from edge.app.commands.explain import Explanation, Space, explain
-from edge.arrays import Integers
+from edge.arrays import Floats, Integers
 from edge.decide.model import Model
 from edge.decide.summary import doubt
 from edge.errors import counted
@@ -24,12 +25,10 @@ from train.model.pipeline import (
     Choices,
     ContactClassifier,
     Fits,
-    FittedTask,
     Slopes,
     fittable,
     slopes_of,
 )
-from train.model.projection import MOST_STEPS
 from train.report import page
 from train.report.figures import confusion
 from train.report.score import interval, percent
@@ -37,8 +36,6 @@ from train.report.section import Row, Section, Table
 from train.report.summary import Prices, accuracy, candidates, names
 from train.report.work import Workers
 
-EXPLAINED = 60
-"""About this many trials are explained beside the wrong answers."""
 UNTOUCHED = "(no contact)"
 
 
@@ -47,23 +44,16 @@ class Answers:
     """A task's answers to held-out trials.
 
     Attributes:
-        classes: the task's labels, sorted.
         truth: (n,) labels; empty where a trial has none, or was never held out.
         answers: (n,) the answers of fits to the other trials.
-        explained: {trial: explanation of its answer} for the wrong answers and some
-            others.
+        nearest: (n,) the trial nearest to each in such a fit.
+        distances: (n,) to it.
     """
 
-    classes: list[str]
     truth: Strings
     answers: Strings
-    explained: dict[int, Explanation]
-
-    @property
-    def wrong(self) -> list[int]:
-        """The trials with a wrong answer."""
-        wrong: list[int] = np.flatnonzero(self.answers != self.truth).tolist()
-        return wrong
+    nearest: Integers
+    distances: Floats
 
 
 @dataclass(frozen=True)
@@ -76,29 +66,17 @@ class Exported:
     prices: Prices
 
 
-@dataclass(frozen=True)
-class Shared:
-    """What tasks with the same settings share.
-
-    Attributes:
-        slopes: of the settings, by all trials.
-        fits: {numbers of training trials: fits on them}.
-    """
-
-    slopes: Slopes
-    fits: dict[bytes, Fits] = field(default_factory=dict)
-
-
 def _without_fold(
     vectors: Vectors,
     choices: Choices,
     tests: Mapping[str, Integers],
-) -> dict[str, tuple[Strings, dict[int, Explanation]]]:
+) -> dict[str, tuple[Strings, Integers, Floats]]:
     """{task: the results of `_held_out`} of tasks with the same settings, which share
     their fits, from {task: its held-out trials}."""
-    shared = Shared(slopes_of([choices], vectors))
+    slopes = slopes_of([choices], vectors)
+    fits: dict[bytes, Fits] = {}
     return {
-        task: _held_out(vectors, task, choices, test, shared)
+        task: _held_out(vectors, task, choices, test, slopes, fits)
         for task, test in tests.items()
     }
 
@@ -108,62 +86,32 @@ def _held_out(
     task: str,
     choices: Choices,
     test: Integers,
-    shared: Shared,
-) -> tuple[Strings, dict[int, Explanation]]:
-    """(test,) answers to held-out trials, and explanations as `Answers` has
-    them.
+    slopes: Slopes,
+    fits: dict[bytes, Fits],
+) -> tuple[Strings, Integers, Floats]:
+    """(test,) answers to held-out trials, the trials nearest to them, and their
+    distances.
 
     Args:
         vectors: (n, p) of all trials.
         task: the task to answer.
         choices: each task's settings, chosen without the held-out trials.
         test: the held-out trials.
-        shared: whose fits are taken, and added to.
+        slopes: of the settings, by all trials.
+        fits: {numbers of training trials: fits on them}, taken and added to.
     """
-    labels = vectors.y[task]
-    classes, index = np.unique(labels, return_inverse=True)
-    counting = labels != ""
+    counting = vectors.y[task] != ""
     counting[test] = False
     training = np.flatnonzero(counting)
     X = vectors.X[test]
     fewer = vectors.part(training)
     possible = fittable(choices, fewer.y)
-    fits = shared.fits.setdefault(training.tobytes(), {})
-    model = ContactClassifier.of(possible, fewer, fits, shared.slopes)
-    answers = model.tasks_[task].classes[model.decide(X)[task].labels]
-    _, voters = model.tasks_[task].neighbours(X)
-    space = _space(model.tasks_[task], index[training])
-    form = vectors.features, vectors.columns
-
-    def numbered(neighbour: Any) -> Any:
-        """The training trial under its number among all trials; None stays None."""
-        return neighbour and neighbour._replace(row=int(training[neighbour.row]))
-
-    explained = {}
-    for place, (trial, answer) in enumerate(zip(test.tolist(), answers, strict=True)):
-        if answer != labels[trial] or trial % max(len(labels) // EXPLAINED, 1) == 0:
-            label = int(np.searchsorted(classes, answer))
-            truth = int(index[trial])
-            why = explain(space, X[place], voters[place].tolist(), label, *form, truth)
-            voted = tuple(map(numbered, why.voters))
-            explained[trial] = why._replace(voters=voted, rival=numbered(why.rival))
-    return answers, explained
-
-
-def _space(fitted: FittedTask, labels: Integers) -> Space:
-    """The space of a task, whose trials have these labels (n,)."""
-    projection = fitted.space.projection
-    grid = projection.grid_
-    return Space(
-        columns=fitted.space.columns,
-        mean=projection.mean_,
-        gain=projection.gain_,
-        weights=projection.weights_[:, : fitted.components],
-        rows=fitted.rows,
-        labels=labels,
-        reach=MOST_STEPS * grid.step,
-        limit=grid.limit * grid.unit,
-    )
+    of_training = fits.setdefault(training.tobytes(), {})
+    model = ContactClassifier.of(possible, fewer, of_training, slopes)
+    fitted = model.tasks_[task]
+    distances, neighbours = fitted.neighbours(X)
+    answers = fitted.classes[model.decide(X)[task].labels]
+    return answers, training[neighbours[:, 0]], distances[:, 0]
 
 
 def answers_of(fitted: Fitted, jobs: int = 1) -> dict[str, Answers]:
@@ -180,8 +128,8 @@ def answers_of(fitted: Fitted, jobs: int = 1) -> dict[str, Answers]:
         labels = vectors.y[task]
         tested = (chosen.folds >= 0) & (labels != "")
         truth = np.where(tested, labels, "")
-        classes = np.unique(labels).tolist()
-        answers[task] = Answers(classes, truth, truth.copy(), {})
+        nearest = np.zeros(len(labels), dtype=np.int64)
+        answers[task] = Answers(truth, truth.copy(), nearest, np.zeros(len(labels)))
         for fold, by_task in enumerate(chosen.by_fold):
             test = np.flatnonzero(tested & (chosen.folds == fold))
             if test.size:
@@ -191,9 +139,10 @@ def answers_of(fitted: Fitted, jobs: int = 1) -> dict[str, Answers]:
     of_cases = list(cases.values())
     results = Workers(jobs).map("report", without_fold, of_cases)
     for (_, tests), by_task in zip(of_cases, results, strict=True):
-        for task, (answered, explained) in by_task.items():
+        for task, (answered, nearest, distances) in by_task.items():
             answers[task].answers[tests[task]] = answered
-            answers[task].explained.update(explained)
+            answers[task].nearest[tests[task]] = nearest
+            answers[task].distances[tests[task]] = distances
     return answers
 
 
@@ -215,9 +164,13 @@ def write(
     """
     exported = Exported(fitted, answers_of(fitted, jobs), model, prices)
     accuracies = [_accuracy(exported, task) for task in fitted.chosen]
-    sections = [*accuracies, *(section(exported) for section in SECTIONS)]
+    sections = [
+        _recordings(fitted),
+        *accuracies,
+        *(section(exported) for section in SECTIONS),
+    ]
     lead = [
-        f"The model was fitted on {counted(model.info.rows, 'trial')}, and decides "
+        f"The model was fitted on {counted(len(fitted.dataset.trials), 'trial')}, and decides "
         f"{model.info.window_s:g} s after the onset of a contact. Its version is "
         f"{model.version}; "
         f"the digest of its recordings begins with {model.info.data_digest[:16]}.",
@@ -229,6 +182,23 @@ def write(
         *(line[0].upper() + line[1:] + "." for line in fitted.notes),
     ]
     return page.write(out, f"Model {model.info.name}", lead, sections)
+
+
+def _recordings(fitted: Fitted) -> Section:
+    """How many trials there are of each label, robot and day."""
+    values: list[tuple[str, str]] = []
+    for trial in fitted.dataset.trials:
+        meta = trial.recording.meta
+        of_trial = {task: trial.labels.get(task, "") for task in fitted.chosen}
+        of_trial |= {key: str(meta.get(key, "")) for key in ("robot", "day")}
+        # A touch that a robot kept says when that was.
+        of_trial["day"] = of_trial["day"] or str(meta.get("kept", ""))[:10]
+        values += filter(itemgetter(1), of_trial.items())
+    rows: list[Row] = [
+        {"key": key, "value": value, "trials": count}
+        for (key, value), count in sorted(Counter(values).items())
+    ]
+    return Section("Recordings", tables=[Table("recordings", "Trials", rows)])
 
 
 def _accuracy(exported: Exported, task: str) -> Section:
@@ -290,58 +260,35 @@ def _wrong(exported: Exported) -> Section:
     rows = []
     trials = names(exported.fitted.measured)[1]
     for task, answer in exported.answers.items():
-        for trial in answer.wrong:
-            why = answer.explained[trial]
+        for trial in np.flatnonzero(answer.answers != answer.truth):
             rows.append(
                 {
                     "trial": trials[trial],
                     "task": task,
                     "label": answer.truth[trial],
                     "answer": answer.answers[trial],
-                    "nearest trial": trials[why.voters[0].row],
-                    "distance": why.voters[0].distance,
-                    "distance to its label": why.rival.distance if why.rival else "",
-                    "strongest pull": next(iter(why.pulls), ""),
+                    "nearest trial": trials[answer.nearest[trial]],
+                    "distance": answer.distances[trial],
                 }
             )
     text = [
-        "A model that had not seen these trials classified them wrongly. The last "
-        "column names the feature that pulls a trial most strongly towards the wrong "
-        "answer, compared with the nearest trial of the right label. Wrong labels and "
-        "failed touches often stand out here. `edge-classify explain` explains any "
-        "recording in the same way."
+        "A model that had not seen these trials classified them wrongly. Wrong labels "
+        "and failed touches often stand out here. `edge-classify explain` names the "
+        "nearest trials of any recording."
     ]
     table = Table("wrong", "Wrong answers", rows)
     return Section("Wrong answers", text if rows else ["None."], [table])
 
 
 def _features(exported: Exported) -> Section:
-    """Each feature's share in the answers to held-out trials."""
-    fitted = exported.fitted
-    dataset = fitted.dataset
-    rows = []
-    widths = dict(zip(dataset.names, dataset.widths(fitted.samples), strict=True))
-    for name, unit in dataset.units.items():
-        row: Row = {"feature": name}
-        for task, answer in exported.answers.items():
-            pulls = [why.pulls for why in answer.explained.values() if why.pulls]
-            shares = [
-                abs(of_answer.get(name, 0.0))
-                / (sum(map(abs, of_answer.values())) or 1.0)
-                for of_answer in pulls
-            ]
-            row[f"{task}, % of pull"] = percent(float(np.mean(shares or [0.0])))
-        row["unit"] = "" if unit == "1" else unit
-        row["values"] = widths[name]
-        rows.append(row)
-    text = [
-        "A feature's pull says how much nearer the feature brings a touch to the "
-        "nearest trial with the model's answer than to the nearest trial with another "
-        "label. The table gives each feature's share of all pulls, as a mean over the "
-        f"wrong answers and about {EXPLAINED} other held-out trials."
+    """The features of the model."""
+    dataset = exported.fitted.dataset
+    widths = dataset.widths(exported.fitted.samples)
+    rows: list[Row] = [
+        {"feature": name, "unit": "" if unit == "1" else unit, "values": width}
+        for (name, unit), width in zip(dataset.units.items(), widths, strict=True)
     ]
-    table = Table("features", "Each feature's share of the pull", rows)
-    return Section("Features", text, [table])
+    return Section("Features", tables=[Table("features", "Features", rows)])
 
 
 def _sizes(exported: Exported) -> Section:
@@ -351,10 +298,8 @@ def _sizes(exported: Exported) -> Section:
         f"The model file takes {size:.0f} kB. The candidates' accuracies come from "
         "nested cross-validation, and stand with their 95 % intervals. The times are "
         "for features and decision together on this machine; `edge-classify bench` "
-        "measures those of a board. A star marks the candidate chosen for a task, "
-        "which is the smallest one within a standard error of the best, or among fewer "
-        "than 200 single trials the one with the best grades. A candidate without a "
-        "number was dropped after a few folds, as behind or no better than a cheaper one."
+        "measures those of a board. A star marks the candidate chosen for a task. A "
+        "candidate without a number was dropped after a few folds."
     ]
     return Section(
         "Candidates, sizes and times",

@@ -56,7 +56,7 @@ class Group:
         self.places = places
 
 
-class Clock(Group):
+class StepClock(Group):
     """Each trial's own clock, (n,) each.
 
     Attributes:
@@ -75,7 +75,7 @@ class Clock(Group):
 
 
 @dataclass
-class Joints:
+class JointGains:
     """The arm's joints, the same in all trials, (dof, 1) each.
 
     Attributes:
@@ -119,7 +119,7 @@ class Arm(Group):
     point: Vector
 
 
-class Contact(Group):
+class ContactState(Group):
     """The contact between forearm and object.
 
     Attributes:
@@ -218,7 +218,7 @@ class RowSprings:
     stiffness: Array
 
 
-class Touch(Group):
+class SkinLoad(Group):
     """What the skin feels at a frame.
 
     Attributes:

@@ -126,7 +126,7 @@ def plan_of(effects: tuple[tuple[str, ...], ...]) -> Plan:
     owners = [("base", module_of("base"), everyone)]
     owners += [(name, module_of(name), mask) for name, mask in calls.items()]
     stages = {stage: _hooks(stage, owners) for stage in STAGES}
-    # Hooks of the same trials share one mask, and so what is gathered for them.
+    # Hooks of the same trials share one mask, and so the arrays gathered for them.
     masks: dict[bytes, Mask] = {}
     for call in (call for hooks in stages.values() for call in hooks):
         call.which = masks.setdefault(call.which.tobytes(), call.which)

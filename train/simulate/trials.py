@@ -16,15 +16,15 @@ from train.simulate.contact import bed_law, by_depth
 from train.simulate.groups import (
     Arm,
     Bed,
-    Clock,
-    Contact,
+    ContactState,
     Group,
-    Joints,
+    JointGains,
     Pair,
     PerJoint,
     PerRow,
     RowSprings,
-    Touch,
+    SkinLoad,
+    StepClock,
 )
 from train.simulate.plan import ANSWER, Call, Plan
 from train.simulate.scene_model import Scene, TrialSpec
@@ -67,9 +67,9 @@ class Batch:
         self.n = len(self.specs)
         self.sizes = {"row": scene.skin.rows, "column": columns, "joint": scene.arm.dof}
         self.sizes |= {"xyz": 3, "pair": 2, "spring": 0, "line": 1}
-        self.joints = Joints(stiffness, damping)
+        self.joints = JointGains(stiffness, damping)
         self.clock = self.begin(
-            Clock,
+            StepClock,
             usual=usual,
             steps=usual,
             steps_left=0,
@@ -77,7 +77,7 @@ class Batch:
             h=h,
         )
         self.arm = self.begin(Arm)
-        self.contact = self.begin(Contact)
+        self.contact = self.begin(ContactState)
         self.contact.arrays["free_depth"] = self.contact.y[0]
         self.bed = self.begin(
             Bed,
@@ -88,7 +88,7 @@ class Batch:
             lost=False,
         )
         self.bed.arrays["first_row_force"] = self.bed.row_force[0]
-        self.touch = self.begin(Touch)
+        self.touch = self.begin(SkinLoad)
         self.row_springs: RowSprings | None = None
         self.everyone = Trials(self, np.arange(self.n), np.arange(self.n))
 
@@ -139,11 +139,11 @@ class Trials:
         self.scene = batch.scene
         self.joints = batch.joints
         at = None if len(places) == batch.n else places
-        self.clock = Clock(batch.clock.arrays, at)
+        self.clock = StepClock(batch.clock.arrays, at)
         self.arm = Arm(batch.arm.arrays, at)
-        self.contact = Contact(batch.contact.arrays, at)
+        self.contact = ContactState(batch.contact.arrays, at)
         self.bed = Bed(batch.bed.arrays, at)
-        self.touch = Touch(batch.touch.arrays, at)
+        self.touch = SkinLoad(batch.touch.arrays, at)
         self.values = Gathered(batch.values, places)
         self.states = Gathered(batch.states, at)
         self._parts: dict[int, Trials | None] = {}
@@ -228,10 +228,10 @@ class Trials:
         more = max(added.stop - len(bed["gaps"]), 0)
         if intact is not None and bed["intact"].shape[1] == 1:
             bed["intact"] = np.repeat(bed["intact"], intact.shape[1], axis=1)
-        rest = (0, more), (0, 0)
-        bed["gaps"] = np.pad(bed["gaps"], rest, constant_values=np.inf)
-        bed["stiffness"] = np.pad(bed["stiffness"], rest)
-        bed["intact"] = np.pad(bed["intact"], (*rest, (0, 0)), constant_values=1.0)
+        padding = (0, more), (0, 0)
+        bed["gaps"] = np.pad(bed["gaps"], padding, constant_values=np.inf)
+        bed["stiffness"] = np.pad(bed["stiffness"], padding)
+        bed["intact"] = np.pad(bed["intact"], (*padding, (0, 0)), constant_values=1.0)
         bed["gaps"][added, self.places] = np.where(stiffness > 0.0, gaps, np.inf)
         bed["stiffness"][added, self.places] = stiffness
         if intact is not None:
@@ -242,10 +242,10 @@ class Trials:
         """Set the law of springs (E, m); returns their order by depth."""
         order, gaps, stiffness = by_depth(gaps, stiffness)
         bed = self.bed.arrays
-        rest = (0, max(len(gaps) - len(bed["law_gaps"]), 0)), (0, 0)
-        bed["law_gaps"] = np.pad(bed["law_gaps"], rest, constant_values=np.inf)
-        bed["slopes"] = np.pad(bed["slopes"], rest)
-        bed["intercepts"] = np.pad(bed["intercepts"], rest)
+        padding = (0, max(len(gaps) - len(bed["law_gaps"]), 0)), (0, 0)
+        bed["law_gaps"] = np.pad(bed["law_gaps"], padding, constant_values=np.inf)
+        bed["slopes"] = np.pad(bed["slopes"], padding)
+        bed["intercepts"] = np.pad(bed["intercepts"], padding)
         bed["law_gaps"][: len(gaps), self.places] = gaps
         self.set_lines(*bed_law(gaps, stiffness))
         return order

@@ -3,7 +3,7 @@
 from typing import Any
 
 from train.report.figures import PANEL, STROKES, curve, legend, picture, spread
-from train.report.score import majority, percent, points, shares
+from train.report.score import majority, percent, shares
 from train.report.section import Figure, Row, Section, Table
 from train.tradeoff.choices import WINDOWS_S, unseen
 from train.tradeoff.measured import Measurements
@@ -21,17 +21,17 @@ EARLY = (
 """Options that export the model whose early decisions were measured."""
 
 
-def answers(measured: Measurements, task: str) -> list[Row]:
+def answers(measurements: Measurements, task: str) -> list[Row]:
     """The rows of a task's table: fixed windows, early decisions, and guessing."""
-    make = measured.commands
+    make = measurements.commands
     rows: list[Row] = []
-    for window_s, choices in measured.points.items():
+    for window_s, choices in measurements.points.items():
         choice = choices[task]
         row: Row = {"decision": f"after {window_s:g} s", "time s": window_s}
         row |= shares(choice.by_trial) | _unseen(unseen(choice))
         row["command"] = f"`{make.export(f'--window {window_s:g}')}`"
         rows.append(row)
-    for rule in measured.certified[task]:
+    for rule in measurements.certified[task]:
         row = {"decision": f"early, at most {rule.error:.0%} wrong"}
         row["time s"] = round(rule.mean_s, 3)
         mean = None if rule.unseen is None else float(rule.unseen.mean())
@@ -39,7 +39,7 @@ def answers(measured: Measurements, task: str) -> list[Row]:
         row["command"] = f"`{make.export(*EARLY)}`, then `{make.run(rule.error)}`"
         rows.append(row)
     guess = {"decision": "always the most frequent label", "time s": 0.0}
-    return [*rows, guess | shares(majority(measured.y[task]))]
+    return [*rows, guess | shares(majority(measurements.y[task]))]
 
 
 def _unseen(share: float | None) -> Row:
@@ -47,62 +47,43 @@ def _unseen(share: float | None) -> Row:
     return {"unseen objects %": "" if share is None else percent(share)}
 
 
-def section(measured: Measurements) -> Section:
+def section(measurements: Measurements) -> Section:
     """The accuracy of each task after each time, as tables and a picture."""
     return Section(
         "Accuracy after each time",
-        tables=[Table(f"answer_{t}", t, answers(measured, t)) for t in measured.y],
-        figures=[picture_of(measured)],
-    )
-
-
-def early(measured: Measurements) -> Section:
-    """Early decisions of each task, compared with waiting for the full window."""
-    rows: list[Row] = [
-        {
-            "task": task,
-            "requested error %": percent(rule.error),
-            "right %": percent(rule.result.accuracy),
-            "mean time s": round(rule.mean_s, 3),
-            "points over waiting": points(rule.gain),
-        }
-        for task, rules in measured.certified.items()
-        for rule in rules
-    ]
-    return Section(
-        "Early decisions",
-        [
-            "With a requested error rate, the model decides as soon as it is sure "
-            "enough. The mean times are those that the export of all contacts promises; "
-            "rates that it does not certify have no row. Exports without a fifth of the "
-            "contacts, or of the objects, decide these by its rules. A contact unlike "
-            "all trained ones waits for the full window. An object that is unknown gets no "
-            "name, which counts as wrong.",
+        tables=[
+            Table(f"answer_{t}", t, answers(measurements, t)) for t in measurements.y
         ],
-        [Table("early", "Decisions with a requested error rate", rows)],
+        figures=[picture_of(measurements)],
     )
 
 
-def reasons(measured: Measurements) -> Section:
+def reasons(measurements: Measurements) -> Section:
     """What comes on top of the times, and the commands that export the models."""
     wire = "the time on the skin's wires, which the recordings do not name,"
-    if measured.wire_s is not None:
-        wire = f"{1e3 * measured.wire_s:.1f} ms on the wire"
+    if measurements.wire_s is not None:
+        wire = f"{1e3 * measurements.wire_s:.1f} ms on the wire"
     notes = [
-        "Each time on this page is that of the touch itself, from first contact. On top "
-        f"come {wire} and {1e3 * measured.board.arithmetic_s:.2f} ms of arithmetic on "
-        f"{measured.board.name}."
+        "The time of a decision is that of the touch itself, from first contact. On top "
+        f"come {wire} and {1e3 * measurements.board.arithmetic_s:.2f} ms of arithmetic on "
+        f"{measurements.board.name}."
     ]
-    commands = measured.commands
-    windows = ", ".join(f"{window:g}" for window in measured.points)
+    commands = measurements.commands
+    windows = ", ".join(f"{window:g}" for window in measurements.points)
     kind = "quick choice" if commands.quick else "choice of `make export`"
     notes += [
-        *measured.notes,
-        f"All accuracies belong to the {kind}, made at windows of "
+        *measurements.notes,
+        f"The accuracies after each time belong to the {kind}, made at windows of "
         f"{windows} s. To export one of the measured models, use `{commands.front('fast')}`, or "
         "`balanced` (a window of at most 0.9 s) or `accurate` in place of `fast`; `500` is "
         "the most accurate one within 500 ms, and `0.8` the fastest one that reaches "
         "80 %.",
+        "Early decisions are made as soon as the model is sure enough for a requested "
+        "error rate. Their mean times are those that the export of all contacts promises; "
+        "rates that it does not certify have no row. Exports without a fifth of the "
+        "contacts, or of the objects, decide these by its rules. A contact unlike all "
+        "trained ones waits for the full window. An object that is unknown gets no name, "
+        "which counts as wrong.",
         "The commands of early decisions play a recording; give `run` your `--skin` in "
         "place of `--fake` to decide live. `--error` refuses a rate that the trials "
         "cannot certify, and names the smallest that they can. Leave a margin above it.",
@@ -151,16 +132,16 @@ GLOSSARY = {
 }
 
 
-def picture_of(measured: Measurements) -> Figure:
+def picture_of(measurements: Measurements) -> Figure:
     """Accuracy against time in a panel for each task."""
-    m = len(measured.y)
+    m = len(measurements.y)
     across = m if m <= ACROSS else -(-m // 2)
     down = -(-m // across)
 
     def draw(canvas: Any) -> None:
         grid = canvas.subplots(down, across, squeeze=False, sharey=True)
-        for axes, task in zip(grid.flat, measured.y, strict=False):
-            _panel(axes, task, measured)
+        for axes, task in zip(grid.flat, measurements.y, strict=False):
+            _panel(axes, task, measurements)
         for axes in grid.flat[m:]:
             axes.set_visible(False)
         for axes in grid[:, 0]:
@@ -175,10 +156,10 @@ def picture_of(measured: Measurements) -> Figure:
     return picture("tradeoff", title, draw, 3.0 * down + 0.4, width)
 
 
-def _panel(axes: Any, task: str, measured: Measurements) -> None:
+def _panel(axes: Any, task: str, measurements: Measurements) -> None:
     """Draw a task's accuracy after fixed windows and with early decisions."""
-    results = measured.results(task)
-    chance = 100 * majority(measured.y[task]).accuracy
+    results = measurements.results(task)
+    chance = 100 * majority(measurements.y[task]).accuracy
     axes.axhline(
         chance,
         color="0.45",
@@ -188,7 +169,7 @@ def _panel(axes: Any, task: str, measured: Measurements) -> None:
     )
     curve(axes, 0, "after a fixed time", list(results), list(results.values()))
     colour, marker, dashes = STROKES[1]
-    rules = measured.certified[task]
+    rules = measurements.certified[task]
     if rules:
         share, arms = spread([rule.result for rule in rules])
         axes.errorbar(

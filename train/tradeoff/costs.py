@@ -167,7 +167,7 @@ def row_of(case: Saving, base: Mapping[str, Hits], after: Mapping[str, Hits]) ->
     return {"change": case.name, **gains, "saves": case.price}
 
 
-def section(measured: Measurements) -> Section:
+def section(measurements: Measurements) -> Section:
     """A row for each change."""
     title = "Accuracy gained or lost by each change"
     return Section(
@@ -178,5 +178,5 @@ def section(measured: Measurements) -> Section:
             "again with the features that suit the change. A larger taxel reads the sum "
             "of the forces on its area. The last section explains points and intervals.",
         ],
-        [Table("costs", title, measured.costs)],
+        [Table("costs", title, measurements.costs)],
     )

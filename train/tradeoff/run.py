@@ -26,9 +26,8 @@ SECTIONS: tuple[Callable[[Measurements], Section], ...] = (
     answer.section,
     costs.section,
     answer.reasons,
-    answer.early,
-    lambda measured: boards.section(measured.board),
-    lambda measured: Section("Terms", terms=answer.GLOSSARY),
+    lambda measurements: boards.section(measurements.board),
+    lambda measurements: Section("Terms", terms=answer.GLOSSARY),
 )
 """The report's sections, in its order."""
 FEWEST = 40
@@ -88,7 +87,7 @@ def tradeoff(
     certified = early.certified(dataset, WINDOWS_S, quick=quick, jobs=jobs)
     rows = costs.measure(raw, dataset, points, rate, workers)
     order = sorted(dataset.tasks, key=lambda task: (task != main, task))
-    measured = Measurements(
+    measurements = Measurements(
         y={task: dataset.labels(task) for task in order},
         board=board,
         wire_s=_wire_time_s(raw.recordings, rate),
@@ -103,7 +102,7 @@ def tradeoff(
         ),
         notes=ready.notes,
     )
-    report = _write(measured, out, counted(len(dataset.trials), "contact"))
+    report = _write(measurements, out, counted(len(dataset.trials), "contact"))
     front = ParetoFront.of(points, main, quick=quick)
     text = json.dumps(front.to_dict(dataset.digest), indent=1)
     with write_whole(out / "front.json") as file:
@@ -140,12 +139,12 @@ def _main_task(dataset: DataSet, task: str | None) -> str:
     return main
 
 
-def _write(measured: Measurements, out: Path, contacts: str) -> Path:
+def _write(measurements: Measurements, out: Path, contacts: str) -> Path:
     """Write the report on so many contacts."""
     lead = [
         "How long must a robot wait before it knows what its arm has touched? This "
         "report measures the accuracy after each time, and the cost of each way to "
         f"save. It is based on {contacts}."
     ]
-    sections = [make(measured) for make in SECTIONS]
+    sections = [make(measurements) for make in SECTIONS]
     return write(out, "Accuracy against time", lead, sections)

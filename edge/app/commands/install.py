@@ -3,36 +3,27 @@
 Verifies the model with its golden file, and against the skin file if one is given. The
 model that ran is kept as the former one beside the new one, which takes its place in
 one step; --back exchanges the two. A golden file has its model's version in its name.
-With --service, the service is restarted, and the former model comes back by itself if
-the service has not run for a minute.
+Restart the service then.
 """
 
 import argparse
 import hashlib
-import os
-import subprocess
-import time
-from collections.abc import Callable, Iterator
-from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 
 from edge.app.options import add_file
 from edge.app.output import LOG, Output
 from edge.decide.model import LARGEST_BYTES, Model
 from edge.decide.verify import golden_of, verify
-from edge.errors import EdgeError, InputError
-from edge.files import read_bytes, refusing
+from edge.errors import InputError
+from edge.files import read_bytes
 from edge.touch.layout import differences
 from edge.wire.skin.file import load
-from edge.writing import lock, remove_leftovers, write_whole
+from edge.writing import alone, write_whole
 
 FORMER = ".former"
 """Ends the name of the model that was replaced."""
 LEAVING = ".leaving"
 """Ends the name of a copy of the model that is being replaced."""
-PROVE_S = 60.0
-"""How long a service must run with a new model."""
-LOOK_S = 2.0
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
@@ -50,51 +41,28 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         help="its golden.npz (default: that beside the model)",
     )
     add_file(parser, "skin", "the skin that the model must suit")
-    parser.add_argument("--service", help="systemd service to restart, and to watch")
     parser.add_argument(
         "--back",
         action="store_true",
-        help="exchange the model for the former one",
+        help="exchange of the model for the former one",
     )
 
 
-@contextmanager
-def alone(folder: Path) -> Iterator[None]:
-    """Let no other program install into a folder during the block.
-
-    Raises:
-        InputError: another program does.
-    """
-    with ExitStack() as stack:
-        with suppress(OSError):  # no such folder, or a system without locks
-            handle = os.open(folder, os.O_RDONLY)
-            stack.callback(os.close, handle)
-            try:
-                lock(handle)
-            except BlockingIOError:
-                raise InputError(
-                    f"{folder}: another program installs a model; wait until it has ended"
-                ) from None
-        yield
-
-
 def run(arguments: argparse.Namespace) -> int:
-    """Install, or go back; 1 if the new model did not prove itself."""
-    with alone(arguments.to.parent):
+    """Install, or go back."""
+    with alone(arguments.to.parent, "installs a model"):
         return _exchange(arguments)
 
 
 def _exchange(arguments: argparse.Namespace) -> int:
     output = Output.of(arguments)
     target = arguments.to
-    remove_leftovers(target.parent)
     finish(target)
     if arguments.back:
         former = beside(target, FORMER)
         if former.is_file():
             Model(former)  # a damaged one must not take a working one's place
         go_back(target)
-        restart(arguments.service)
         model = Model(target)
         text = f"{target}: the former model {model.version} is back"
         output.event({"event": "installed", "version": model.version}, text)
@@ -105,16 +73,6 @@ def _exchange(arguments: argparse.Namespace) -> int:
     golden = arguments.golden or new.with_name("golden.npz")
     prove(new, golden, arguments.skin)
     place(new, golden, target)
-    try:
-        restart(arguments.service)
-    except EdgeError:
-        _return_by_itself(target)
-        raise
-    if arguments.service and not runs_on(is_active_of(arguments.service)):
-        LOG.error(f"{arguments.service} does not run with the new model")
-        if _return_by_itself(target):
-            restart(arguments.service)
-        return 1
     version = Model(target).version
     text = (
         f"{target}: {version} is installed; `edge-classify install --back --to {target}` "
@@ -200,15 +158,6 @@ def finish(target: Path) -> None:
     leaving.replace(former)
 
 
-def _return_by_itself(target: Path) -> bool:
-    """Bring the former model back; whether there is one."""
-    if not beside(target, FORMER).is_file():
-        return False
-    go_back(target)
-    LOG.error(f"{target}: the former model is back")
-    return True
-
-
 def go_back(target: Path) -> None:
     """Exchange the model for the former one.
 
@@ -224,46 +173,3 @@ def go_back(target: Path) -> None:
 def _write(goal: Path, data: bytes) -> None:
     with write_whole(goal) as file:
         file.write(data)
-
-
-def restart(service: str | None) -> None:
-    """Restart a service, where there is one.
-
-    Raises:
-        EdgeError: systemctl refuses, or is not there.
-    """
-    if service is None:
-        return
-    command = ["systemctl", "restart", service]
-    with refusing(f"{service} cannot be restarted with systemctl"):
-        completed = subprocess.run(command, capture_output=True, text=True, check=False)
-    if completed.returncode:
-        reason = completed.stderr.strip() or f"exit status {completed.returncode}"
-        raise EdgeError(f"{service} cannot be restarted: {reason}")
-
-
-def is_active_of(service: str) -> Callable[[], bool]:
-    """A function that asks whether a service runs, and was not started again since it
-    was asked first."""
-    command = ["systemctl", "show", "--property=ActiveState,NRestarts", service]
-    former: list[str] = []
-
-    def is_active() -> bool:
-        completed = subprocess.run(command, capture_output=True, text=True, check=False)
-        state = completed.stdout.split()
-        former[:] = former or state
-        return "ActiveState=active" in state and state == former
-
-    return is_active
-
-
-def runs_on(
-    is_active: Callable[[], bool],
-    sleep: Callable[[float], None] = time.sleep,
-) -> bool:
-    """Whether a service runs at every look for so long."""
-    for _ in range(round(PROVE_S / LOOK_S)):
-        sleep(LOOK_S)
-        if not is_active():
-            return False
-    return True

@@ -4,7 +4,7 @@ Prints each recording's labels and decisions, how many recordings have each labe
 which are probably slips. With --set, --unset, --accept, --leave-out or --put-back, shows
 what would change, and with --yes writes it into labels.csv beside the recordings, which
 wins over their own labels. Recordings stay as they are. --undo takes the last change
-back, ten times. The next `make export` trains on the new labels.
+back. The next `make export` trains on the new labels.
 """
 
 import argparse
@@ -20,7 +20,7 @@ from edge.app.output import Output
 from edge.app.review import Touch, changed
 from edge.app.texts import labels_text
 from edge.errors import InputError, counted
-from edge.record.changes import FORMER, Change, Former, change, formers, now, undo
+from edge.record.changes import FORMER, Change, change, former, now, undo
 from edge.record.labels import Standing, Table, read_table
 from edge.record.recording import read_meta
 from edge.record.saving import listed, warn_of_remains
@@ -43,19 +43,19 @@ def add_options(parser: argparse.ArgumentParser) -> None:
             "--set",
             "TASK=LABEL",
             task_label,
-            "give every recording named this label; repeat it for more tasks",
+            "label for every recording named; repeat it for more tasks",
         ),
         (
             "--unset",
             "TASK",
             str,
-            "take this task's label away; repeat it for more",
+            "task whose label is taken away; repeat it for more",
         ),
         (
             "--only",
             "WHICH",
             str,
-            "only recordings that are unsure, wrong, unlabelled or left_out, that have a "
+            "recordings that are unsure, wrong, unlabelled or left_out, that have a "
             "task, or a label (object=cupp); repeat it for those that are all of these",
         ),
     ):
@@ -68,12 +68,12 @@ def add_options(parser: argparse.ArgumentParser) -> None:
             help=text,
         )
     for option, text in {
-        "--accept": "label kept touches as they were decided, in tasks without a label",
-        "--leave-out": "leave the recordings out of whatever reads the folder",
-        "--put-back": "take recordings in again that were left out",
-        "--rows": "give each recording its row, to go on in a spreadsheet",
-        "--undo": "take the last change in a folder back",
-        "--yes": "change the labels, which else are only shown",
+        "--accept": "labels of kept touches as they were decided, in tasks without one",
+        "--leave-out": "recordings named are left out by whatever reads the folder",
+        "--put-back": "recordings that were left out are taken in again",
+        "--rows": "a row for each recording, to go on in a spreadsheet",
+        "--undo": "the last change in a folder is taken back",
+        "--yes": "change of the labels, which else are only shown",
     }.items():
         parser.add_argument(option, action="store_true", help=text)
 
@@ -166,21 +166,19 @@ def _undo(data: Sequence[str], output: Output) -> int:
     Raises:
         InputError: there is nothing to take back, or no such folder.
     """
-    last: list[Former] = []
+    places = []
     for name in data:
         if not os.path.isdir(name):
             raise InputError(f"{name}: --undo takes the folder of the recordings")
-        for place in Path(name).rglob(FORMER):
-            last += formers(place.parent)[-1:]
+        places += [path.parent for path in Path(name).rglob(FORMER)]
+    last = list(filter(None, map(former, places)))
     if not last:
         raise InputError(f"{', '.join(data)}: there is no change to take back")
-    latest = max(former.time for former in last)
-    for former in last:
-        if former.time == latest:
-            folder = undo(former)
-            output.text(
-                f"{folder}: is as before `{former.command}` of {latest[:19]} UTC"
-            )
+    latest = max(it.time for it in last)
+    for it in last:
+        if it.time == latest:
+            folder = undo(it)
+            output.text(f"{folder}: is as before `{it.command}` of {latest[:19]} UTC")
     return 0
 
 

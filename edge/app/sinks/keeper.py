@@ -14,17 +14,17 @@ from edge.app.output import LOG
 from edge.app.review import decisions_of, is_unsure
 from edge.app.sinks.sink import Event
 from edge.app.source import Opened
-from edge.app.trials import Trials, recording, shared_meta
+from edge.app.trials import Segmenter, recording, shared_meta
 from edge.decide.events import Decided
 from edge.decide.info import ModelInfo
 from edge.decide.model import Model
 from edge.errors import EdgeError, InputError, counted
-from edge.record.changes import alone
+from edge.record.changes import CHANGES
 from edge.record.labels import read_table
 from edge.record.recording import read_meta
 from edge.record.saving import save
 from edge.touch.frame import Frame
-from edge.writing import check_writable
+from edge.writing import alone, check_writable
 
 REASONS = ("unsure", "unknown", "unusual", "all")
 LONGEST_S = 10.0
@@ -104,7 +104,7 @@ class Keeper:
         self._meta = shared_meta(opened, info.chain)
         if info.chain is not None:
             self._meta["joint_names"] = list(info.chain.names)
-        self._trials = Trials(opened.skin, LONGEST_S)
+        self._trials = Segmenter(opened.skin, LONGEST_S)
         self._complete: deque[list[Frame]] = deque()
         """The frames of touches that wait for their decisions."""
         self._decided: list[Decided] = []
@@ -191,7 +191,7 @@ class Keeper:
         if excess <= 0:
             return
         # Who changes labels here keeps all; the next touch makes room.
-        with suppress(InputError), alone(self._folder):
+        with suppress(InputError), alone(self._folder, CHANGES):
             rows = read_table(self._folder).rows
             for file, size in sizes.items():
                 if excess > 0 and file.name not in rows and not is_labelled(file):

@@ -23,7 +23,7 @@ from edge.app.texts import event_text
 from edge.decide.events import Decided, Onset
 from edge.errors import InputError
 from edge.files import parsing
-from edge.record.changes import Change, Former, change, formers, now, undo
+from edge.record.changes import Change, change, former, now, undo
 from edge.record.labels import Standing, read_table
 from edge.record.recording import load, read_meta
 from edge.record.slips import doubts, too_few
@@ -260,16 +260,16 @@ class Page:
                 rows.append((touch, sentences))
         start = str(action.get("start", 0))
         first = int(start) if start.isdecimal() else 0
-        last: list[Former] = []
+        last = None
         with self._naming():
-            last = formers(folder)[-1:]
+            last = former(folder)
         return {
             "trials": list(starmap(self._row, rows[first : first + SHOWN])),
             "total": len(rows),
             "all": len(touches),
             "words": sorted(words.items()),
             "doubts": doubtful[-1] + too_few(labels),
-            "undo": [{"time": it.time, "command": it.command} for it in last],
+            "undo": last and {"time": last.time, "command": last.command},
         }
 
     def _row(self, touch: Touch, sentences: Sequence[str]) -> Json:
@@ -336,11 +336,11 @@ class Page:
         Raises:
             InputError: it is another one, or there is none.
         """
-        last = formers(folder)[-1:]
+        last = former(folder)
         try:
-            if not last or last[0].time != action.get("time"):
+            if last is None or last.time != action.get("time"):
                 raise InputError("the labels have been changed since; look again")
-            undo(last[0])
+            undo(last)
         finally:
             self.look()
 

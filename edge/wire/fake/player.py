@@ -34,6 +34,9 @@ NOISE_STEP_S = 0.001
 seconds."""
 PAUSES = 2.0
 """Times `release_s` that a looped recording pauses before it starts again."""
+NOISE_COUNTS = 0.7
+"""Noise of the fake chips of a skin file, as a standard deviation. A skin that is
+calibrated with noise and then played without is taken for frozen."""
 Scene = Callable[[float], Counts]
 """Counts above baseline (rows, cols) at a time in seconds since the start."""
 
@@ -269,7 +272,6 @@ def play_file(
     file: SkinFile | None,
     *,
     joint_names: Sequence[str] | None = None,
-    noise_counts: float = 0.0,
     loop: bool = False,
     real_time: bool = False,
 ) -> tuple[Skin, Playback]:
@@ -279,13 +281,14 @@ def play_file(
         path: of the recording.
         file: the skin's; None chooses chips that suit the recording, without noise.
         joint_names: the joints whose angles are wanted, in their order.
-        noise_counts, loop: see `fake_buses` and `Playback`.
+        loop: see `Playback`.
         real_time: play it at its original speed.
 
     Raises:
         InputError: the recording cannot be used, or its shape is not the skin's.
     """
     recording = load(path)
+    noise_counts = NOISE_COUNTS
     if joint_names is not None:
         recording = recording.for_joints(joint_names, path)
     if file is None:

@@ -129,7 +129,7 @@ def clients(link):
 def page(load, seconds):
     """The row of a run with the page."""
     run = ["run", "--model", demo.MODEL, "--fake", demo.recordings()[0]]
-    run += "--real-time --loop --json --web 127.0.0.1:0 --seconds".split()
+    run += "--loop --json --web 127.0.0.1:0 --seconds".split()
     with started(*run, seconds, stdout=subprocess.PIPE) as running:
         links = (re.search(r"http://\S+", line) for line in running.stderr)
         link = next(filter(None, links))[0]

@@ -15,7 +15,6 @@ from typing import Any
 import numpy as np
 
 from edge.app.cli import main as edge_main
-from edge.app.commands.explain import Space
 from edge.decide.model import Model
 from edge.errors import InputError
 from edge.touch.arm import Chain
@@ -126,7 +125,6 @@ def read_model(path):
         confidence = decision.confidence
         if confidence is not None and not 0.0 <= confidence <= 1.0:
             raise Wrong(f"{task} has a confidence of {confidence}")
-        Space.of(model, task)
 
 
 def skins():

@@ -1,13 +1,10 @@
-"""Limits of novelty, certified errors, and what pulls in an explanation."""
-
-from fractions import Fraction
+"""Limits of novelty, and certified errors."""
 
 import mpmath
 import numpy as np
 from hypothesis import strategies as st
 from mpmath import mpf
 
-from edge.app.commands.explain import Space, explain
 from tests.checks.hard_cases.cases import SEEDS, Case, Ladder, decades, powers_of_ten
 from train.model.novelty import TAIL, UNUSUAL_RATE, limits_of
 from train.model.rules import upper_limit
@@ -54,41 +51,6 @@ def certified_error(trials, share):
         return float(abs(total - level) / level)
 
 
-def explained_error(offset, seed):
-    """Largest error of a distance's square and of the pulls that make it, over the
-    lengths, for a touch and trials so far from the mean."""
-    rng = np.random.default_rng(seed)
-    space = Space(
-        columns=np.arange(12),
-        mean=rng.normal(size=12),
-        gain=rng.gamma(2.0, size=12),
-        weights=rng.normal(size=(12, 3)),
-        rows=offset * rng.normal(size=(8, 3)),
-        labels=np.arange(8) % 2,
-    )
-    touch = space.mean + offset * rng.normal(size=12)
-    why = explain(space, touch, range(8), 0, ["a", "b", "c"], [3, 4, 5])
-    exact = np.vectorize(Fraction, otypes=[object])
-    scaled = exact((touch - space.mean) * space.gain)
-    moved = scaled[:, None] * exact(space.weights)
-    z = moved.sum(axis=0)
-    worst = Fraction(0)
-    for near in why.voters:
-        row = exact(space.rows[near.row])
-        size = z @ z + row @ row
-        square = Fraction(near.distance) ** 2
-        errors = [abs(square - ((z - row) @ (z - row)))]
-        for name, columns in {
-            "a": slice(3),
-            "b": slice(3, 7),
-            "c": slice(7, 12),
-        }.items():
-            pull = 2 * moved[columns].sum(axis=0) @ row
-            errors.append(abs(Fraction(near.pulls[name]) - pull))
-        worst = max(worst, max(errors) / size)
-    return float(worst)
-
-
 CASES = [
     Case(
         "novelty's limits: scores that spread over many decades",
@@ -109,15 +71,5 @@ CASES = [
         {"trials": st.integers(20, 3000), "share": st.floats(0.0, 0.9)},
         Ladder("trials", [20, 140, 1000, 10_000], "trials", "856 and 140"),
         bound=1e-11,
-    ),
-    Case(
-        "explain: distances, and the pulls that make them",
-        "fractions",
-        "error over the lengths",
-        explained_error,
-        [{"offset": 1.0, "seed": 0}],
-        {"offset": powers_of_ten(-9.0, 9.0), "seed": SEEDS},
-        Ladder("distance from the mean", decades(0, 12, 1), "offset", "up to 10"),
-        bound=1e-14,
     ),
 ]

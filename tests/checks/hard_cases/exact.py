@@ -142,3 +142,59 @@ def doubt(space, point, vectors):
         # With weights in quarters, the root is four times as long.
         remoteness.append(least_root(apart * quarters, at.weighted_nearness) / 4.0)
     return {"novelty": np.array(novelty), "remoteness": np.array(remoteness)}
+
+
+def outputs(fitted, X, y, vectors):
+    """What a model is to answer to vectors, but for `doubt`.
+
+    Args:
+        fitted: a `ContactClassifier`.
+        X: (trials, p) its training vectors.
+        y: {task: their labels}.
+        vectors: (n, p).
+    """
+    tasks = fitted.tasks_
+    spaces = {
+        space: projected(vectors[:, space.columns], space.projection)
+        for space in {task.space for task in tasks.values()}
+    }
+    cut = np.any([of_space.cut for of_space in spaces.values()], axis=0)
+    answers = {"out_of_range": cut.astype(np.float64)}
+    for name, task in tasks.items():
+        answers |= _outputs(name, task, X, y[name], spaces[task.space].units)
+    return answers
+
+
+def _outputs(name, task, X, y, points):
+    """The outputs of a task, by the coordinates (n, c) of vectors."""
+    members = np.flatnonzero(y != "")
+    labels = y[members].tolist()
+    classes = sorted(set(labels))
+    space = task.space
+    rows = coordinates(X[members][:, space.columns], space.projection, task.components)
+    scale = Fraction(task.unit) * Fraction(task.slope)
+    answers = []
+    for query in points[:, : task.components]:
+        near, squares = nearest(rows, query, task.k)
+        votes = [labels[i] for i in near]
+        answers.append(
+            {
+                "label": classes.index(winner(votes)),
+                "scores": [float(Fraction(votes.count(c), task.k)) for c in classes],
+                "distances": [distance(squares[i], task.unit) for i in near],
+                "neighbours": members[near],
+                "label_distances": [_far(c, labels, squares, scale) for c in classes],
+            }
+        )
+    return {f"{name}_{end}": np.array([a[end] for a in answers]) for end in answers[0]}
+
+
+def _far(label, labels, squares, scale):
+    """The mean distance of a label's nearest twentieth, at least three, in log odds."""
+    of_label = sorted(
+        s for s, row_label in zip(squares, labels, strict=True) if row_label == label
+    )
+    count = min(len(of_label), max(-(-len(of_label) // 20), 3))
+    wholes = [round(root(square)) for square in of_label[:count]]
+    mean = float(Fraction(sum(wholes), count))
+    return float(Fraction(mean) * Fraction(float(scale)))

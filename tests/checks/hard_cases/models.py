@@ -57,7 +57,7 @@ def describe(fitted, info=None, samples=40):
         info or shipped().info,
         tasks=tasks,
         samples=samples,
-        rows=last.n_trials_,
+        rows=last.n_rows_,
         trials=(),
         decision_points_s=tuple(getattr(fitted, "decision_points_s", ())),
         stopping=getattr(fitted, "stopping_", {}),

@@ -1,4 +1,4 @@
-"""Every output of a model with decision points and a product, and what follows from it.
+"""What follows from the outputs of a model with decision points and a product.
 
 The oracle knows the fitted numbers of a model and the rules that the documentation
 states. It shares no code with the graph, with `train` or with `edge`: it computes in
@@ -15,11 +15,11 @@ from mpmath import mpf
 
 from tests.checks.hard_cases import exact
 from tests.checks.hard_cases.cases import SEEDS, Case, Ladder, decades, powers_of_ten
-from tests.checks.hard_cases.models import exported, features, one_by_one
+from tests.checks.hard_cases.models import exported, features
 from tests.checks.hard_cases.neighbours import near_duplicates, offset_data
 from train.data.folds import stratified_folds
 from train.model.pipeline import Choice
-from train.model.stopping import EarlySettings, SequentialClassifier
+from train.model.stopping import SequentialClassifier
 
 POINTS_S = (0.4, 0.8, 1.2)
 LDA = {"projection": "lda", "shrinkage": 0.1}
@@ -31,14 +31,7 @@ CHOICES = {
     "surface": Choice("III", 5, 7),
 }
 """Of every number of neighbours that the graph treats in its own way: one, two, more."""
-FIRST = {
-    "category": Choice("IV", 3, 5, features=("contact_area",), **LDA),
-    "mobility": Choice("none", 5, 1, features=("max_force", "contact_motion")),
-}
-"""Settings of early points, of two of the tasks."""
-EARLY = "own features early"
 KINDS = ("contacts", "near-duplicates", "duplicates", "offset", "tiny")
-TASK_OUTPUTS = ("label", "scores", "distances", "neighbours", "label_distances")
 
 
 def labels_of(n):
@@ -74,7 +67,7 @@ class Whole:
 
     Args:
         n: training trials, a multiple of eight.
-        kind: one of `KINDS`, or `EARLY`.
+        kind: one of `KINDS`.
     """
 
     def __init__(self, n, kind):
@@ -82,11 +75,10 @@ class Whole:
         self.y = labels_of(n)
         # Early windows: of the same trials, with less of what tells them apart.
         self.X = np.stack([X[::-1], 0.5 * (X + X[::-1]), X])
-        early = EarlySettings(FIRST, [FIRST] * 10) if kind == EARLY else None
-        classifier = SequentialClassifier(CHOICES, POINTS_S, early=early)
+        classifier = SequentialClassifier(CHOICES, POINTS_S)
         folds = stratified_folds(self.y["object"])
         self.fitted = classifier.fit(self.X, self.y, folds, [CHOICES] * 10)
-        self.data, self.model = exported(self.fitted)
+        _, self.model = exported(self.fitted)
 
     def queries(self, seed, factor, count=10):
         """Vectors between training rows, on them, and `factor` times as far away."""
@@ -100,82 +92,13 @@ class Whole:
     def outputs(self, vectors, point):
         """What the graph is to answer to vectors (n, 120) at a decision point."""
         fitted = self.fitted.decision_points_[point]
-        spaces = {
-            space: exact.projected(vectors[:, space.columns], space.projection)
-            for space in {task.space for task in fitted.tasks_.values()}
-        }
-        cut = np.any([projected.cut for projected in spaces.values()], axis=0)
-        expected = {
-            "out_of_range": cut.astype(np.float64),
-            **exact.doubt(self.fitted.space_, point, vectors),
-        }
-        for task in CHOICES:
-            points = spaces[fitted.tasks_[task].space].units
-            expected |= self._task(task, fitted, points, point)
-        return expected
-
-    def _task(self, task, fitted, points, point):
-        task_fit = fitted.tasks_[task]
-        space = task_fit.space
-        members = np.flatnonzero(self.y[task] != "")
-        labels = self.y[task][members].tolist()
-        classes = sorted(set(labels))
-        X = self.X[point][members][:, space.columns]
-        rows = exact.projected(X, space.projection).units
-        directions = task_fit.components
-        unit = task_fit.unit
-        scale = Fraction(unit) * Fraction(task_fit.slope)
-        answers = []
-        for query in points:
-            k = CHOICES[task].k
-            near, squares = exact.nearest(rows[:, :directions], query[:directions], k)
-            votes = [labels[i] for i in near]
-            answers.append(
-                (
-                    classes.index(exact.winner(votes)),
-                    [float(Fraction(votes.count(label), k)) for label in classes],
-                    [exact.distance(squares[i], unit) for i in near],
-                    members[near],
-                    [_far(label, labels, squares, scale) for label in classes],
-                )
-            )
-        columns_of = zip(*answers, strict=True)
-        pairs = zip(TASK_OUTPUTS, columns_of, strict=True)
-        return {f"{task}_{end}": np.array(column) for end, column in pairs}
-
-
-def _far(label, labels, squares, scale):
-    """The mean distance of a label's nearest twentieth, at least three, in log odds."""
-    distances = sorted(
-        s for s, row_label in zip(squares, labels, strict=True) if row_label == label
-    )
-    count = min(len(distances), max(-(-len(distances) // 20), 3))
-    wholes = [round(exact.root(square)) for square in distances[:count]]
-    mean = float(Fraction(sum(wholes), count))
-    return float(Fraction(mean) * Fraction(float(scale)))
+        answers = exact.outputs(fitted, self.X[point], self.y, vectors)
+        return answers | exact.doubt(self.fitted.space_, point, vectors)
 
 
 @cache
 def whole(n, kind):
     return Whole(n, kind)
-
-
-def differing(answers, expected):
-    """Values of the expected outputs that have another bit."""
-    assert answers.keys() == expected.keys()
-    count = 0
-    for name, value in expected.items():
-        fits = np.shape(answers[name]) == value.shape
-        count += int((np.asarray(answers[name]) != value).sum()) if fits else value.size
-    return float(count)
-
-
-def outputs_error(kind, point, factor, seed):
-    """Values of all outputs that are not the oracle's."""
-    subject = whole(160, kind)
-    vectors = subject.queries(seed, factor)
-    answers = one_by_one(subject.model, vectors, point)
-    return differing(answers, subject.outputs(vectors, point))
 
 
 def agreed(task, factors, distances):
@@ -274,26 +197,6 @@ FARTHER = Ladder(
 )
 
 CASES = [
-    Case(
-        "outputs: every output at every decision point, of five tasks",
-        "whole numbers and fractions, from the fitted numbers",
-        "values with another bit",
-        outputs_error,
-        HAZARDS,
-        AROUND,
-        FARTHER,
-        examples=6,
-    ),
-    Case(
-        "outputs: early points with features and directions of their own",
-        "whole numbers and fractions, from the fitted numbers",
-        "values with another bit",
-        outputs_error,
-        [{**at, "kind": EARLY, "point": i} for i, at in enumerate(HAZARDS[:3])],
-        AROUND | {"kind": st.just(EARLY)},
-        FARTHER,
-        examples=6,
-    ),
     Case(
         "outputs: a product and its factors agree; ties of votes",
         "fractions, each sum rounded once",

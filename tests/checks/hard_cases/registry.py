@@ -2,7 +2,7 @@
 
 from importlib import import_module
 
-GROUPS = "neighbours outputs scaling frames touches calibration everywhere simulator"
+GROUPS = "neighbours outputs scaling frames touches calibration simulator"
 CASES = [
     case
     for name in GROUPS.split()

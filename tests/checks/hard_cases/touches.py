@@ -8,7 +8,7 @@ from edge.touch.frame import Frame
 from edge.touch.layout import SkinLayout
 from tests.checks.hard_cases.cases import SEEDS, Case, Ladder
 from tests.edge.features.test_kernels import by_hand
-from tests.edge.features.test_names import moments
+from tests.edge.features.test_quantities import moments
 from tests.edge.touch.pressed import quantities, zones_of
 
 

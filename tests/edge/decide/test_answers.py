@@ -63,10 +63,10 @@ def test_a_model_that_cannot_be_run_is_an_error_and_no_flag(
 ):
     broken = Model(exported / "model.onnx")
 
-    def run(names, inputs):
+    def score(vectors, point):
         raise InputError("an index past its tensor")
 
-    monkeypatch.setattr(broken._engine, "run", run)
+    monkeypatch.setattr(broken._scorer, "score", score)
     with pytest.raises(InputError, match="cannot be run .*; copy or export it again"):
         list(Classifier(broken).classify(make_touch()))
 

@@ -1,4 +1,4 @@
-"""ONNX Runtime and numpy give the same bits; numpy steps in where the other is missing."""
+"""Numpy steps in where ONNX Runtime is missing, and no text of a file reaches a terminal."""
 
 import logging
 import sys
@@ -12,49 +12,11 @@ import edge as edge_package
 from edge import demo
 from edge.decide.model import Model
 from edge.errors import EdgeError, InputError
-from tests.conftest import ROOT, sealed
-
-MODELS = [demo.MODEL, ROOT / "tests" / "golden" / "model.onnx"]
-
-
-def assert_same_bits(path, vectors):
-    """Both engines answer the same vectors alike; what is not finite has no label."""
-    runtime = Model(path, "onnxruntime")
-    graph = Model(path, "numpy")
-    for point in range(len(runtime.decision_points_s)):
-        for vector in vectors:
-            expected = runtime.run(vector[None], point)
-            answer = graph.run(vector[None], point)
-            assert answer.keys() == expected.keys()
-            for name in {"out_of_range", "novelty", "remoteness"} & expected.keys():
-                assert answer[name].tobytes() == expected[name].tobytes()
-            for task in runtime.info.tasks:
-                assert_same_answer(task, answer, expected)
-
-
-def assert_same_answer(task, answer, expected):
-    label = expected[f"{task}_label"]
-    assert answer[f"{task}_label"] == label
-    for name, value in expected.items():
-        if name.startswith(f"{task}_") and label >= 0:
-            assert answer[name].dtype == value.dtype
-            assert answer[name].shape == value.shape
-            assert answer[name].tobytes() == value.tobytes()
-
-
-def hostile(width, rng):
-    """Vectors of every kind: plain, far, equal, not finite."""
-    plain = rng.normal(size=(6, width))
-    far = 10.0 ** rng.uniform(0, 14, (6, 1)) * rng.normal(size=(6, width))
-    odd = np.zeros((4, width))
-    odd[1] = np.nan
-    odd[2, 0] = np.inf
-    odd[3] = 1e308
-    return np.concatenate([plain, far, odd])
+from tests.conftest import sealed
 
 
 def test_names_of_a_file_reach_no_terminal_through_a_log(tmp_path, capfd):
-    """An index that is past its table only when the graph runs."""
+    """An index that is past its table once the graph runs."""
     proto = onnx.load(demo.MODEL)
     for number, node in enumerate(proto.graph.node):
         node.name = f"\x1b[2J{number}"
@@ -63,21 +25,10 @@ def test_names_of_a_file_reach_no_terminal_through_a_log(tmp_path, capfd):
     labels.CopyFrom(numpy_helper.from_array(far.astype(np.int64), labels.name))
     path = tmp_path / "model.onnx"
     path.write_bytes(sealed(proto))
-    model = Model(path, "onnxruntime")
     with pytest.raises(InputError) as refused:
-        model.decide(np.zeros(model.info.width))
+        Model(path, "onnxruntime")
     output = str(refused.value), *capfd.readouterr()
     assert "\x1b" not in "".join(output)
-
-
-@pytest.mark.parametrize("path", MODELS)
-def test_the_models_of_the_checkout_have_the_same_bits_in_both(path):
-    golden = path.with_name("golden.npz")
-    rng = np.random.default_rng(1)
-    vectors = hostile(Model(path).info.width, rng)
-    if golden.exists():
-        vectors = np.concatenate([vectors, np.load(golden)["vectors"]])
-    assert_same_bits(path, vectors)
 
 
 def without_onnxruntime(monkeypatch):

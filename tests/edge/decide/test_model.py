@@ -10,6 +10,7 @@ import onnx
 import pytest
 from onnx import TensorProto, helper
 
+from edge.decide.engines import ENGINES
 from edge.decide.info import FORMAT, METADATA_KEY
 from edge.decide.metadata import to_json
 from edge.decide.metadata_reader import from_json
@@ -142,10 +143,9 @@ def category(**changes):
 
 REFUSED = {
     no_metadata: "no edge-classify metadata",
-    another_attribute: "ONNX Runtime refuses it",
     another_input: "has an input more",
     edited(dict.clear): "its metadata: not JSON",
-    meta(samples=30): "no tensor(double) features of shape [90], which its metadata",
+    meta(samples=30): "cannot be run",
     meta(
         window_s="soon"
     ): "window_s must be a number above 0, at most 3600, not 'soon'",
@@ -162,10 +162,10 @@ REFUSED = {
     meta(trials=["a"]): "names 1 of 16 trials",
     edited(
         lambda m: m["tasks"]["category"]["labels"].append("liquid")
-    ): "no tensor(double) category_scores of shape [3]",
+    ): "category_scores is float64 (1, 2)",
     edited(
         lambda m: m["tasks"].update(mobility=m["tasks"]["category"])
-    ): "no tensor(int64) mobility_label",
+    ): "cannot be run",
     # Three objects would have one pair of labels.
     edited(
         lambda m: m["tasks"]["object"].update(
@@ -193,13 +193,19 @@ REFUSED = {
 }
 
 
+@pytest.mark.parametrize("engine", ENGINES)
 @pytest.mark.parametrize("change", REFUSED, ids=REFUSED.values())
-def test_a_model_that_is_not_ours_is_refused_in_one_sentence(change, altered):
+def test_a_model_that_is_not_ours_is_refused_in_one_sentence(change, engine, altered):
     path = altered(change)
     with pytest.raises(InputError, match=re.escape(REFUSED[change])) as caught:
-        Model(path)
+        Model(path, engine)
     assert str(path) in str(caught.value)
     assert "\n" not in str(caught.value)
+
+
+def test_what_onnx_runtime_cannot_load_is_refused(altered):
+    with pytest.raises(InputError, match="ONNX Runtime refuses it"):
+        Model(altered(another_attribute), "onnxruntime")
 
 
 def with_factors(info, labels, softness, mobility):
@@ -252,33 +258,6 @@ def test_a_model_of_each_released_format_is_read_or_refused_with_the_remedy(path
     )
 
 
-class Underived:
-    """An engine that leaves open the sizes of one output."""
-
-    name = "underived"
-
-    def __init__(self, engine, output):
-        self.run = engine.run
-        self.inputs = engine.inputs
-        kind, sizes = engine.outputs[output]
-        self.outputs = engine.outputs | {output: (kind, [sizes[0], "unknown"])}
-
-
-def test_sizes_that_an_older_runtime_does_not_derive_are_left_to_the_run(
-    exported, monkeypatch
-):
-    model = Model(exported / "model.onnx")
-    engine = model._engine
-    monkeypatch.setattr(model, "_engine", Underived(engine, "object_scores"))
-    model._check()
-    assert len(model.decide(np.zeros(model.info.width))["object"].scores) == 4
-    monkeypatch.setattr(model, "_engine", Underived(engine, "object_label"))
-    with pytest.raises(
-        InputError, match=r"no tensor\(int64\) object_label of shape \[\]"
-    ):
-        model._check()
-
-
 def test_a_graph_that_answers_a_row_with_a_scalar_is_refused(altered):
     def scalar(proto):
         node = next(n for n in proto.graph.node if "out_of_range" in n.output)
@@ -288,11 +267,8 @@ def test_a_graph_that_answers_a_row_with_a_scalar_is_refused(altered):
         output = next(x for x in proto.graph.output if x.name == "out_of_range")
         del output.type.tensor_type.shape.dim[:]
 
-    model = Model(altered(scalar))
-    with pytest.raises(
-        InputError, match=r"out_of_range has the shape \(\)\); copy or export it"
-    ):
-        model.decide(np.zeros(model.info.width))
+    with pytest.raises(InputError, match="out_of_range is float64 .*; copy or export"):
+        Model(altered(scalar), "onnxruntime")
 
 
 @pytest.mark.parametrize(

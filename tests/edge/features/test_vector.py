@@ -2,6 +2,7 @@
 
 import math
 import os
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -106,30 +107,80 @@ def test_times_that_stand_still_or_go_back_never_reach_the_samples():
 
 
 def test_motion_is_interpolated_over_frames_without_a_pose():
-    motion = [0.0, np.nan, 0.2, np.nan]
-    vector = feature_vector(
-        series([0.0, 0.4, 0.8, 1.2], [1] * 4, motion=motion),
-        1.2,
-        samples=4,
-    )
-    assert vector[8:] == pytest.approx([0.0, 0.1, 0.2, 0.2])
-    none = feature_vector(
-        series([0.0, 1.2], [1, 1], motion=[np.nan] * 2),
-        1.2,
-        samples=4,
-    )
-    assert none[8:].tolist() == [0.0] * 4
+    for motion, sampled in (
+        ([0.0, np.nan, 0.2, np.nan], [0.0, 0.1, 0.2, 0.2]),
+        ([np.nan] * 4, [0.0] * 4),
+    ):
+        felt = series([0.0, 0.4, 0.8, 1.2], [1] * 4, motion=motion)
+        vector = feature_vector(felt, 1.2, samples=4)
+        assert vector[8:] == pytest.approx(sampled)
 
 
-@pytest.mark.parametrize("window", [0.0, float("nan"), float("inf")])
-def test_a_window_that_makes_no_sense_is_refused(window):
-    with pytest.raises(InputError, match="window"):
-        feature_vector(series([0.0], [1]), window)
+def pressed_vector(layout, taxels, features, samples, window_s=1.0):
+    """The features (features, samples) of frames of these taxels, uniform in a
+    second."""
+    times = np.linspace(0.0, 1.0, len(taxels))
+    frames = [pressed(layout, t, of) for t, of in zip(times, taxels, strict=True)]
+    contact = followed(layout, frames, features=features)
+    vector = feature_vector(contact.series(), window_s, samples, features)
+    return vector.reshape(-1, samples).tolist()
 
 
-def test_too_few_samples_and_an_empty_series_are_refused():
-    with pytest.raises(InputError, match="at least 2 samples"):
-        feature_vector(series([0.0], [1]), 1.2, samples=1)
+FLAT = SkinLayout(5, 7, threshold_counts=10, onset_counts=10, counts_per_newton=100.0)
+
+
+def test_a_contact_is_followed_across_the_seam_and_does_not_jump():
+    taxels = [{(2, (5 + i) % 7): 50} for i in range(5)]
+    around = pressed_vector(replace(FLAT, wraps=True), taxels, ["contact_around"], 5)
+    assert around == [[5.0, 6.0, 7.0, 8.0, 9.0]]
+
+
+def test_where_nothing_lies_the_place_is_that_of_the_frames_that_know_it():
+    """The right half is touched in two frames of nine, and the contact ends."""
+    right = [0, 0, 40, 80, 0, 0, 0, 0, 0]
+    taxels = [
+        {(1, 1): 60 if i < 4 else 0, (i % 4, 5): force} for i, force in enumerate(right)
+    ]
+    features = ["right_along", "right_force", "right_area"]
+    assert pressed_vector(FLAT, taxels, features, 9) == [
+        [2.0, 2.0, 2.0, 3.0, 3.0, 3.0, 3.0, 3.0, 3.0],
+        [0.0, 0.0, 0.4, 0.8, 0.0, 0.0, 0.0, 0.0, 0.0],
+        [0.0, 0.0, 1.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0],
+    ]
+    assert pressed_vector(FLAT, taxels[:2], ["right_along"], 2) == [[0.0, 0.0]]
+
+
+def test_a_rate_is_the_change_a_second_of_the_sampled_values():
+    taxels = [{(1, 1): 100 + 20 * i} for i in range(11)]
+    features = ["max_force", "max_force_rate", "contact_area_rate"]
+    force, rate, area_rate = pressed_vector(FLAT, taxels, features, 5)
+    assert force == pytest.approx([1.0, 1.5, 2.0, 2.5, 3.0])
+    assert rate == pytest.approx([2.0] * 5)
+    assert area_rate == [0.0] * 5
+
+
+def test_force_motion_follows_the_force_where_the_area_stays():
+    taxels = [{(1, 1): 50, (1, 2): force} for force in (50, 150, 50)]
+    features = ["contact_motion", "force_motion"]
+    motion, of_force = pressed_vector(replace(FLAT, pitch_m=0.01), taxels, features, 3)
+    assert motion == [0.0, 0.0, 0.0]
+    assert of_force == pytest.approx([0.0, 0.0025, 0.0], abs=1e-17)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "word"),
+    [
+        ((0.0,), "window"),
+        ((math.nan,), "window"),
+        ((math.inf,), "window"),
+        ((1.2, 1), "at least 2 samples"),
+        ((1.2, 2, ["stiffness"]), "stiffness was not measured"),
+        ((1.2, 2, ["skin_force"]), "skin_force was not measured"),
+    ],
+)
+def test_what_makes_no_sense_or_was_not_measured_is_refused(arguments, word):
+    with pytest.raises(InputError, match=word):
+        feature_vector(series([0.0], [1]), *arguments)
     with pytest.raises(InputError, match="no frame"):
         feature_vector(series([], []), 1.2)
 

@@ -23,6 +23,12 @@ def test_a_label_that_a_person_gave_is_not_replaced():
     contradictory = {**WHOLE, "category": "rigid-fixed"}
     assert CATEGORY.completed(contradictory) == contradictory
     assert CATEGORY.label(contradictory) == "soft-fixed"
+    assert CATEGORY.contradiction(contradictory).endswith("which say 'soft-fixed'")
+
+
+@pytest.mark.parametrize("labels", [WHOLE, {"mobility": "fixed"}, {"category": "none"}])
+def test_labels_that_agree_are_no_contradiction(labels):
+    assert CATEGORY.contradiction(labels) == ""
 
 
 def test_what_a_model_could_not_hold_is_read_without_it_and_said(caplog):
@@ -50,6 +56,18 @@ def test_a_row_wins_over_a_recordings_own_labels_in_the_columns_of_the_table(tmp
     assert table.standing("b.npz", META) == ({"softness": "hard"}, True)
     assert table.standing("c.npz", META) == Standing(META["labels"])
     assert read_table(tmp_path / "other").rows == {}
+
+
+def test_what_is_left_out_is_said_in_the_words_of_spreadsheets(tmp_path):
+    words = {"": 0, "no": 0, "False": 0, "0": 0, "Yes": 1, "TRUE": 1, "x": 1, "1": 1}
+    lines = "".join(f"{number},{word}\n" for number, word in enumerate(words))
+    rows = read_table(written(tmp_path, f"file,left_out\n{lines}")).rows
+    assert [row.left_out for row in rows.values()] == list(words.values())
+
+
+def test_empty_cells_at_the_ends_of_lines_are_no_columns(tmp_path):
+    table = read_table(written(tmp_path, "file,\na.npz\n"))
+    assert table.standing("a.npz", META) == Standing(META["labels"])
 
 
 def test_a_spreadsheet_may_save_it_with_semicolons_and_a_mark(tmp_path):

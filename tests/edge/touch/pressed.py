@@ -51,8 +51,8 @@ def zones_of(layout, frame, features):
     return {zone: numbers[0].tolist() for zone, numbers in split.items()}
 
 
-def quantities(sums, layout, shear=False):
+def quantities(sums, layout):
     """{quantity: (n,)} of the whole numbers (n, width) of a zone."""
     series = SimpleNamespace(zones={"skin": np.array(sums)}, layout=layout)
     zone = ZoneSeries(series, "skin")
-    return {n: q.measure(zone) for n, q in OF_ZONES.items() if q.shear == shear}
+    return {name: quantity.measure(zone) for name, quantity in OF_ZONES.items()}

@@ -11,7 +11,7 @@ from edge.touch.arm import Chain, Joint, read_arm
 
 
 def test_a_urdf_chain_agrees_with_yourdfpy(urdf):
-    chain = Chain.from_urdf(urdf, "base", "tool")
+    chain = read_arm(urdf, "base", "tool")
     assert chain.names == ("shoulder", "elbow", "slide")
     assert chain.limits == (None, (-2.5, 0.0), (0.0, 0.5))
     yourdfpy = pytest.importorskip("yourdfpy", reason="a workstation's package")
@@ -23,28 +23,18 @@ def test_a_urdf_chain_agrees_with_yourdfpy(urdf):
         assert np.abs(chain.pose(q) - expected).max() < 1e-14
 
 
-def test_many_poses_at_once_are_the_single_ones():
-    chain = Chain.cody()
-    q = np.random.default_rng(1).uniform(-2, 2, (7, 3, 5))
-    poses = chain.pose(q)
-    assert poses.shape == (7, 3, 4, 4)
-    for i in np.ndindex(7, 3):
-        assert np.abs(poses[i] - chain.pose(q[i])).max() < 1e-15
-
-
-def test_a_chain_survives_json_and_toml(tmp_path, urdf):
+def test_a_chain_survives_its_metadata(urdf):
     for chain in (Chain.cody(), Chain.from_urdf(urdf, "base", "tool")):
         copy = Chain.from_dict(chain.to_dict())
         q = np.linspace(-1, 1, chain.dof)
         assert (copy.pose(q) == chain.pose(q)).all()
-        assert copy.names == chain.names
+        assert (copy.names, copy.limits) == (chain.names, chain.limits)
 
 
 @pytest.mark.parametrize(
     ("q", "word"),
     [
-        ([0, 0], r"5 joint angles .* not an array \(2,\)"),
-        (1.0, r"not an array \(\)"),
+        ([0, 0], r"not an array \(2,\)"),
         ([0, 0, math.nan, 0, 0], "upper_arm_roll is not within 1e.06 rad"),
         (["a"] * 5, "must be numbers"),
     ],
@@ -52,38 +42,30 @@ def test_a_chain_survives_json_and_toml(tmp_path, urdf):
 def test_missing_extra_and_non_finite_angles_are_named(q, word):
     with pytest.raises(InputError, match=word):
         Chain.cody().pose(q)
-    if isinstance(q, list) and "a" not in q:
-        with pytest.raises(InputError, match=word):
-            Chain.cody().point(q, (0.0, 0.0, 0.0))
+
+
+@pytest.mark.parametrize("q", [[0, 0], [0, 0, math.nan, 0, 0]])
+def test_a_point_takes_no_others(q):
+    with pytest.raises(InputError):
+        Chain.cody().point(q, (0.0, 0.0, 0.0))
 
 
 @pytest.mark.parametrize(
     ("text", "word"),
     [
-        ("", "joint must be a list of tables"),
+        ("", "joint must be"),
         ("speed = 1\n[[joint]]\naxis = [0, 0, 1]", "unknown key speed"),
-        ("[[joint]]\nname = 'j'", "axis is missing"),
         ("[[joint]]\naxis = [0, 0, 0]", "axis is zero"),
-        (
-            "[[joint]]\naxis = [0, 0, 1]\nlimits_deg = [3, 1]",
-            "lower limit 0.0523599 exceeds",
-        ),
-        (
-            "[[joint]]\naxis = [0, 0, 1]\ntype = 'ball'",
-            "type must be one of .* not 'ball'",
-        ),
-        (
-            "[[joint]]\nname = 'hip'\naxis = [0, 0]",
-            "joint 'hip': axis must be a list of 3",
-        ),
-        ("[[joint]]\nname = 'a'\naxis = [0, 0, 1]\n" * 2, "two joints are named 'a'"),
+        ("[[joint]]\naxis = [0, 0, 1]\nlimits_deg = [3, 1]", "0.0523599 exceeds"),
+        ("[[joint]]\nname = 'hip'\naxis = [0, 0]", "joint 'hip': axis"),
+        ("[[joint]]\nname = 'a'\naxis = [0, 0, 1]\n" * 2, "are named 'a'"),
     ],
 )
 def test_a_wrong_toml_chain_is_named(text, word, tmp_path):
     path = tmp_path / "arm.toml"
     path.write_text(text)
-    with pytest.raises(InputError, match=word):
-        Chain.from_toml(path)
+    with pytest.raises(InputError, match=f"arm.toml: .*{word}"):
+        read_arm(path)
 
 
 @pytest.mark.parametrize("axis", [(1e-8, 1e-8, 0.0), (5.0, 5.0, 0.0)])
@@ -103,15 +85,9 @@ def test_a_turn_of_any_size_loses_no_digit(angle):
     assert turned[0, 2] == pytest.approx(float(across), rel=4e-15)
 
 
-def test_a_joint_that_slides_moves_along_its_axis():
-    pose = Chain([Joint("s", (2.0, 3.0, 6.0), kind="prismatic")]).pose([7.0])
-    assert pose[:3, 3].tolist() == pytest.approx([2.0, 3.0, 6.0], rel=1e-15)
-    assert (pose[:3, :3] == np.eye(3)).all()
-
-
 @pytest.mark.parametrize("seed", range(3))
 def test_a_point_is_where_the_pose_takes_it(seed):
-    """Turned joint by joint, it rounds no more than the whole pose does."""
+    """Turned joint by joint, it rounds no more than many whole poses at once do."""
     rng = np.random.default_rng(seed)
     kinds = rng.choice(["revolute", "prismatic", "fixed", "continuous"], 6)
     joints = [
@@ -126,22 +102,17 @@ def test_a_point_is_where_the_pose_takes_it(seed):
         for i, kind in enumerate(kinds)
     ]
     for chain in (Chain(joints), Chain.cody(), Chain([])):
-        q = rng.normal(size=chain.dof)
+        q = rng.normal(size=(2, 3, chain.dof))
         at = rng.normal(size=3)
-        pose = chain.pose(q)
-        point = chain.point(q, tuple(at))
-        assert point == pytest.approx(pose[:3, :3] @ at + pose[:3, 3], abs=1e-14)
+        poses = chain.pose(q)
+        for i in np.ndindex(2, 3):
+            expected = poses[i][:3, :3] @ at + poses[i][:3, 3]
+            assert chain.point(q[i], tuple(at)) == pytest.approx(expected, abs=1e-14)
 
 
-def test_a_urdf_is_read_between_two_links(urdf):
-    assert read_arm(urdf, "base", "tool").dof == 3
-
-
-def test_a_urdf_without_its_links_is_refused(urdf):
-    with pytest.raises(InputError, match="a URDF needs --base and --tip"):
-        read_arm(urdf)
-
-
-def test_links_are_for_a_urdf_alone():
-    with pytest.raises(InputError, match="--base and --tip are for a .urdf file"):
-        read_arm("arm.toml", "base", "tool")
+@pytest.mark.parametrize(
+    ("name", "links"), [("arm.urdf", ()), ("arm.toml", ("base", "tool"))]
+)
+def test_links_are_for_a_urdf_and_needed_there(name, links):
+    with pytest.raises(InputError, match=f"{name}: .*--base and --tip"):
+        read_arm(name, *links)

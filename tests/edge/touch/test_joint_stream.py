@@ -3,6 +3,7 @@
 import json
 import math
 import os
+import re
 import select
 import socket
 from contextlib import closing
@@ -30,6 +31,12 @@ class Wire:
     def send(self, t, q, **more):
         self.data += json.dumps({"t": t, "q": q, **more}).encode() + b"\n"
 
+    def hear(self, now, t, q):
+        """What is known once a line has come."""
+        self.now = now
+        self.send(t, q)
+        return self.at()
+
     def at(self, t=None):
         q = self.joints.at(self.now if t is None else t)
         return None if q is None else q.tolist()
@@ -43,12 +50,9 @@ def wire():
 def stream(wire, lines=range(10), *, hz=100, ahead=lambda i: 1000.0):
     """What is known after each line, of poses [t, -t] whose sender's clock is ahead of
     ours."""
-    poses = []
-    for i in lines:
-        wire.now = i / hz + 0.002
-        wire.send(i / hz + ahead(i), [i / hz, -i / hz])
-        poses.append(wire.at())
-    return poses
+    return [
+        wire.hear(t + 0.002, t + ahead(t), [t, -t]) for t in (i / hz for i in lines)
+    ]
 
 
 @pytest.mark.parametrize("ahead", [-50.0, 1.7e9])
@@ -58,17 +62,10 @@ def test_the_senders_clock_need_not_be_ours(wire, ahead):
     assert wire.at(0.087) == pytest.approx([0.085, -0.085], abs=1e-6)
 
 
-def test_a_pose_between_two_lines_is_interpolated(wire):
-    stream(wire)
-    assert wire.at(0.0645) == pytest.approx([0.0625, -0.0625])
-
-
 def test_between_two_lines_an_angle_that_wraps_goes_the_shorter_way(wire):
     """Half a turn is not crossed backwards through zero."""
     for t, q in ((0.0, 3.14), (0.01, -3.14)):
-        wire.now = t
-        wire.send(t, [q, 0.0])
-        wire.at()
+        wire.hear(t, t, [q, 0.0])
     between = wire.at(0.005)
     assert abs(math.remainder(between[0], 2.0 * math.pi)) == pytest.approx(math.pi)
 
@@ -81,50 +78,32 @@ def test_the_last_pose_holds_no_longer_than_allowed(wire):
 
 def test_a_line_that_comes_late_is_as_old_as_it_is(wire):
     stream(wire)
-    wire.now = 0.2
-    wire.send(1000.1, [9.0, 9.0])  # sent at 0.1: 98 ms late
-    assert wire.at() is None
+    assert wire.hear(0.2, 1000.1, [9.0, 9.0]) is None  # sent at 0.1: 98 ms late
     assert wire.at(0.102) == [9.0, 9.0]
 
 
 def test_a_gap_is_not_bridged(wire):
     stream(wire)
-    wire.now = 0.402
-    wire.send(1000.4, [1.0, 1.0])
-    assert wire.at() == [1.0, 1.0]
+    assert wire.hear(0.402, 1000.4, [1.0, 1.0]) == [1.0, 1.0]
     assert wire.at(0.25) is None
-
-
-def test_a_sender_that_starts_anew_is_believed(wire):
-    stream(wire)
-    wire.now = 0.15
-    wire.send(3.0, [7.0, 7.0])
-    assert wire.at() == [7.0, 7.0]
-    assert wire.joints.malformed == 0
 
 
 def test_the_clocks_may_drift_apart(wire):
     """A sender whose clock is slow by 100 ppm: after ten minutes it is off by 0.06 s."""
     for i in range(6_000):
-        wire.now = i * 0.1
-        wire.send(wire.now * (1.0 - 1e-4), [wire.now, 0.0])
-        q = wire.at()
-        # In the window of 20 s the drift is 2 ms.
-        assert q is not None
-        assert abs(q[0] - wire.now) < 0.0021
+        now = i * 0.1
+        q = wire.hear(now, now * (1.0 - 1e-4), [now, 0.0])
+        assert abs(q[0] - now) < 0.0021  # in the window of 20 s the drift is 2 ms
 
 
 @pytest.mark.parametrize(
     ("line", "problem"),
     [
-        (b"not json", "is not"),
-        (b'{"t": "1", "q": [1, 2]}', "is not"),
         (b'{"t": 1.0, "q": [1, true]}', "is not"),
         (b'{"t": 1.0, "q": [1]}', "has 1 angles, the arm has 2"),
         (b'{"t": 1.0, "q": [1, NaN]}', "a line is not"),
         (b'{"t": 1' + b"0" * 400 + b', "q": [1, 2]}', "a line is not"),
         (b"[" * 100_000, "longer than"),
-        (b"\xff\xfe", "is not"),
     ],
 )
 def test_a_malformed_line_is_counted_and_changes_nothing(wire, line, problem):
@@ -177,48 +156,40 @@ def test_named_angles_are_put_in_the_arms_order():
     wire = Wire(names=("shoulder", "elbow"))
     wire.send(5.0, [0.3, 9.0, 0.1], names=["elbow", "wheel", "shoulder"])
     assert wire.at() == [0.1, 0.3]
-    wire.send(5.01, [0.2, 0.4])
-    wire.now = 0.01
-    assert wire.at() == [0.2, 0.4]
+    assert wire.hear(0.01, 5.01, [0.2, 0.4]) == [0.2, 0.4]
 
 
 @pytest.mark.parametrize(
-    ("q", "names", "problem"),
-    [
-        (
-            [0.1, 0.2],
-            ["elbow", "wrist"],
-            "a line has no angle of the arm's joint shoulder",
-        ),
-        ([0.1, 0.2], ["elbow"], "a line's names are not one for each angle"),
-    ],
+    ("names", "problem"),
+    [(["elbow", "wrist"], "joint.* shoulder"), (["elbow"], "not one for each angle")],
 )
-def test_names_that_do_not_suit_are_refused(q, names, problem):
+def test_names_that_do_not_suit_are_refused(names, problem):
     wire = Wire(names=("shoulder", "elbow"))
-    wire.send(5.0, q, names=names)
+    wire.send(5.0, [0.1, 0.2], names=names)
     assert wire.at() is None
-    assert wire.joints.problem.startswith(problem)
+    assert re.search(problem, wire.joints.problem)
 
 
-@pytest.mark.parametrize("ahead_s", [0.03, 100.0])
-def test_one_line_ahead_of_time_costs_no_later_pose(wire, ahead_s):
-    stream(wire, range(50))
+@pytest.mark.parametrize(("ahead_s", "hz"), [(0.09, 10), (0.03, 100), (100.0, 100)])
+def test_one_line_ahead_of_time_costs_no_later_pose(wire, ahead_s, hz):
+    stream(wire, range(50), hz=hz)
     wire.send(wire.now + 1000.0 + ahead_s, [9.0, 9.0])
     assert wire.at() is not None
-    poses = stream(wire, range(50, 100))
-    np.testing.assert_allclose(
-        poses,
-        [[i / 100, -i / 100] for i in range(50, 100)],
-        atol=1e-6,
-    )
+    poses = stream(wire, range(50, 100), hz=hz)
+    expected = [[i / hz, -i / hz] for i in range(50, 100)]
+    np.testing.assert_allclose(poses, expected, atol=1e-6)
 
 
-@pytest.mark.parametrize("step_s", [0.5, -0.5])
-def test_a_clock_that_was_set_costs_the_pose_for_less_than_a_second(wire, step_s):
+@pytest.mark.parametrize(("step_s", "lines"), [(0.5, 60), (-0.5, 0), (-997.0, 0)])
+def test_a_clock_that_was_set_costs_the_pose_for_less_than_a_second(
+    wire, step_s, lines
+):
+    """Ahead; or back, as of a sender that starts anew, for no line at all."""
     stream(wire, range(50))
     poses = stream(wire, range(50, 150), ahead=lambda _: 1000.0 + step_s)
-    assert None not in poses[60:]
+    assert None not in poses[lines:]
     assert poses[-1] == pytest.approx([1.49, -1.49], abs=1e-6)
+    assert wire.joints.malformed == 0
 
 
 def test_a_flood_of_lines_is_bounded_in_each_frame(wire):

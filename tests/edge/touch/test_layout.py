@@ -7,32 +7,15 @@ import pytest
 
 from edge.errors import InputError
 from edge.touch.layout import SkinLayout, differences, for_device
-from tests.conftest import FOREARM
+from edge.wire.skin import file as skinfile
 
-ANGLES = [
-    -82.05,
-    -67.25,
-    -52.44,
-    -37.22,
-    -22.42,
-    -7.61,
-    7.61,
-    22.42,
-    37.22,
-    52.44,
-    67.25,
-    82.05,
-]
-ANGLES += [97.95, 112.75, 127.56, 142.78, 157.58, 172.39]
-ANGLES += [-172.39, -157.58, -142.78, -127.56, -112.75, -97.95]
-
-CODY = replace(FOREARM, radius_m=0.0460375, column_angles_deg=tuple(ANGLES))
+CODY = skinfile.load(skinfile.shipped("cody")).layout
 
 
 def test_taxels_lie_where_those_of_the_real_forearm_lie(real):
     centres = np.load(real / "meka_forearm_taxel_array_16x24.npz")["centers"]
     ours = np.array([[CODY.position(r, c) for c in range(24)] for r in range(16)])
-    assert np.abs(ours - centres).max() < 1e-6  # the file's own digits
+    assert np.abs(ours - centres).max() < 4e-6  # the digits of the skin's file
 
 
 def test_between_columns_the_shorter_way_round_is_taken():
@@ -58,20 +41,7 @@ def test_units_say_what_is_known():
 
 
 def test_metadata_round_trip():
-    layout = SkinLayout(
-        16,
-        24,
-        True,
-        (0.0108, 0.01205),
-        0.046,
-        0.18,
-        tuple(ANGLES),
-        1000.0,
-        100,
-        150,
-        (3, 7),
-        0.25,
-    )
+    layout = replace(CODY, dead=(3, 7), release_s=0.25, axes=3)
     assert SkinLayout.from_dict(layout.to_dict()) == layout
     assert not SkinLayout.from_dict({"rows": 3, "cols": 4}).wraps
     assert not layout.alive[0, 3]
@@ -98,11 +68,32 @@ def test_what_makes_no_sense_names_its_key_and_the_file(change, word):
     assert "skin.toml" in str(caught.value)
 
 
-def test_thresholds_stay_counts_however_far_the_scales_differ():
-    device = replace(FOREARM, counts_per_newton=1e308)
-    matched = for_device(replace(FOREARM, counts_per_newton=1e-5), device)
-    assert matched.threshold_counts == 65535
-    assert matched.onset == 65535
+@pytest.mark.parametrize(
+    ("scales", "threshold", "onset"),
+    [((1000.0, 2000.0), 200, 300), ((1e-5, 1e308), 65535, 65535)],
+)
+def test_the_models_thresholds_become_counts_of_the_device(scales, threshold, onset):
+    model, device = (
+        SkinLayout(4, 6, counts_per_newton=scale, threshold_counts=n, dead=(n,))
+        for scale, n in zip(scales, (10, 7), strict=True)
+    )
+    model = replace(model, threshold_counts=100, onset_counts=150)
+    matched = {"threshold_counts": threshold, "onset_counts": onset, "dead": (10,)}
+    assert for_device(model, device) == replace(device, **matched)
+
+
+@pytest.mark.parametrize(
+    ("device", "word"),
+    [
+        (SkinLayout(5, 6), "5 x 6 taxels, flat.* made for 4 x 6"),
+        (SkinLayout(4, 6, wraps=True), "closed around"),
+        (SkinLayout(4, 6, counts_per_newton=1.0), "forces in newtons"),
+        (SkinLayout(4, 6, pitch_m=0.1), "lengths in metres"),
+    ],
+)
+def test_another_skin_is_refused(device, word):
+    with pytest.raises(InputError, match=word):
+        for_device(SkinLayout(4, 6), device)
 
 
 @pytest.mark.parametrize(

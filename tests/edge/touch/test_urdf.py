@@ -19,7 +19,7 @@ ARM = """<?xml version="1.0"?>
     <origin xyz="0 0.02 0.25"/></joint>
   <joint name="camera" type="fixed"><parent link="upper"/><child link="aside"/></joint>
   <joint name="slide" type="prismatic"><parent link="lower"/><child link="tool"/>
-    <origin xyz="0.05 0 0" rpy="3 2 1"/><axis xyz="0 1 0"/>
+    <origin xyz="0.05 0 0" rpy="3 2 1"/><axis xyz="0.36 0.48 0.8"/>
     <limit upper="0.5" effort="1" velocity="1"/></joint>
 </robot>"""
 
@@ -32,9 +32,7 @@ def test_a_urdf_gives_the_joints_from_base_to_tip_whatever_their_order_in_the_fi
 
     assert names("lower") == ["shoulder", "bracket", "elbow"]
     assert names("aside") == ["shoulder", "camera"]
-    with pytest.raises(
-        InputError, match="link 'upper' is both base and tip; name the arm's two"
-    ):
+    with pytest.raises(InputError, match="link 'upper' is both base and tip"):
         arm_between(urdf, "upper", "upper")
 
 
@@ -53,27 +51,19 @@ def test_a_urdf_gives_the_joints_from_base_to_tip_whatever_their_order_in_the_fi
             "no chain of joints leads from",
         ),
         (
-            '<parent link="base"/>',
-            '<parent link="upper"/>',
-            "no chain of joints leads from",
+            "</robot>",
+            '<joint name="other" type="fixed"><parent link="base"/>'
+            '<child link="upper"/></joint></robot>',
+            "joints 'shoulder' and 'other' both lead to link 'upper'",
         ),
         ('<child link="upper"/>', "", "joint 'shoulder' has no <child link=...>"),
         ("0.3 0 -1e-3", "0.3 0 x", "joint 'elbow': not numbers: could not convert"),
         (
-            '<axis xyz="0 1 0"/>',
+            '<axis xyz="0.36 0.48 0.8"/>',
             '<mimic joint="elbow"/>',
             "joint 'slide' follows joint 'elbow'",
         ),
-        (
-            'lower="-2.5"',
-            'lower="25"',
-            "joint elbow: its lower limit 25 exceeds its upper",
-        ),
-        (
-            '"continuous"',
-            '"floating"',
-            "joint 'shoulder': type must be one of revolute, co",
-        ),
+        ('"continuous"', '"floating"', "joint 'shoulder': type must be one of"),
     ],
 )
 def test_what_is_wrong_in_a_urdf_is_named(urdf, old, new, sentence):
@@ -81,14 +71,3 @@ def test_what_is_wrong_in_a_urdf_is_named(urdf, old, new, sentence):
     with pytest.raises(InputError, match=r"arm\.urdf: .*") as caught:
         Chain.from_urdf(urdf, "base", "tool")
     assert sentence in str(caught.value)
-
-
-def test_joints_of_one_child_are_refused(urdf):
-    extra = (
-        '<joint name="other" type="fixed"><parent link="base"/>'
-        '<child link="upper"/></joint></robot>'
-    )
-    urdf.write_text(ARM.replace("</robot>", extra))
-    sentence = "joints 'shoulder' and 'other' both lead to link 'upper'"
-    with pytest.raises(InputError, match=sentence):
-        Chain.from_urdf(urdf, "base", "tool")

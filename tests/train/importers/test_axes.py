@@ -123,6 +123,7 @@ def test_what_is_not_three_axes_is_one_sentence(
     [
         (("--axes", "xxyz"), "choose from 'xyz', 'xzy'"),
         (("--falls", "--signed"), "not allowed with argument"),
+        (("--time", "t", "--rate", "9"), "not allowed with argument"),
     ],
 )
 def test_options_that_are_at_odds_are_refused(options, sentence, tmp_path, capsys):

@@ -8,6 +8,7 @@ import pytest
 import export
 import train
 from edge.decide.model import Model
+from edge.features.vector import FEATURES
 from edge.record.recording import load
 from edge.record.saving import save
 from export.api import measure
@@ -28,6 +29,8 @@ def written(recordings, tmp_path_factory):
                 trial, meta={**trial.meta, "labels": {"category": "soft-fixed"}}
             )
         trial.meta["labels"] = {"category": trial.labels["category"]}
+        trial.meta["robot"] = "left" if path.stem == "hard_1" else "right"
+        trial.meta["kept"] = "2026-11-28T23:59:00+00:00"
         if path.stem == "hard_7":
             trial = replace(trial, frames=0 * trial.frames)
         save(folder / path.name, trial)
@@ -47,10 +50,15 @@ def table(page, name):
     return rows_of(page.parent / f"{name}.csv")
 
 
-def test_what_holds_for_every_task_stands_once_before_them(written):
-    text = written[1].read_text()
-    assert text.index("for two fifths") < text.index("Accuracy: category")
-    assert 'aria-label="category: scores of each class"' in text
+def test_trials_are_counted_by_label_robot_and_day(written):
+    rows = table(written[1], "recordings")
+    assert [tuple(row.values()) for row in rows] == [
+        ("category", "rigid-fixed", "6"),
+        ("category", "soft-fixed", "9"),
+        ("day", "2026-11-28", "15"),
+        ("robot", "left", "1"),
+        ("robot", "right", "14"),
+    ]
 
 
 def test_the_answers_are_those_that_the_nested_accuracy_counts(written):
@@ -70,7 +78,7 @@ def test_the_answers_are_those_that_the_nested_accuracy_counts(written):
     assert "The trials include 1 recording without a contact." in page.read_text()
 
 
-def test_a_wrong_answer_is_named_with_its_nearest_trial_and_its_strongest_pull(written):
+def test_a_wrong_answer_is_named_with_its_nearest_trial(written):
     fitted, page = written
     rows = {row["trial"]: row for row in table(page, "wrong")}
     assert len(rows) == (~fitted.chosen["category"].accuracy.hits).sum()
@@ -78,19 +86,13 @@ def test_a_wrong_answer_is_named_with_its_nearest_trial_and_its_strongest_pull(w
     assert row["label"] == "soft-fixed"
     assert row["answer"] == "rigid-fixed"
     assert row["nearest trial"].startswith("hard_")
-    assert float(row["distance"]) < float(row["distance to its label"])
-    assert row["strongest pull"] in ("max_force", "contact_area", "contact_motion")
+    assert row["nearest trial"] != "hard_3"
+    assert float(row["distance"]) > 0.0
 
 
 def test_features_and_prices_have_their_tables(written):
     _, page = written
-    shares = [float(row["category, % of pull"]) for row in table(page, "features")]
-    assert sum(shares) == pytest.approx(100.0, abs=0.02)
+    values = {row["feature"]: row["values"] for row in table(page, "features")}
+    assert values == dict.fromkeys(FEATURES, "40")
     assert [row["features"] for row in table(page, "candidates")] == ["paper"]
     assert float(table(page, "candidates_timings")[0]["us per decision"]) > 0.0
-
-
-def test_the_page_stands_alone(written):
-    _, page = written
-    assert 'src="http' not in page.read_text()
-    assert page.read_text().count("<h2>") == 4 + len(written[0].chosen) - 1

@@ -11,15 +11,6 @@ from edge.touch.layout import SkinLayout
 from train.report.skins import coarser, pool, pooled, pooled_layout
 
 
-def test_pooling_keeps_the_sum_of_forces(forearm, make_touch):
-    touch = make_touch(seed=3)
-    skin = pooled_layout(forearm)
-    summed = pooled(touch, skin)
-    assert summed.frames.shape[1:] == skin.shape == (8, 12)
-    total = touch.frames.astype(int).sum(axis=(1, 2))
-    assert summed.frames.astype(int).sum(axis=(1, 2)).tolist() == total.tolist()
-
-
 def test_a_sum_that_leaves_sixteen_bits_saturates():
     full = Recording(t=np.zeros(1), frames=np.full((1, 4, 4), 65535, dtype=np.uint16))
     skin = pooled_layout(SkinLayout(4, 4))

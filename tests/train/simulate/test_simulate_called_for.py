@@ -129,17 +129,6 @@ def test_results_do_not_depend_on_the_batch():
             assert bits(chosen, i) == bits(together, every.index(spec)), spec.key
 
 
-def test_each_required_effect_has_its_reason():
-    trial_scene = scene("noise", "stribeck", objects=everything())
-    foam = next(o for o in trial_scene.objects if o.family == "foam")
-    required = required_effects(trial_scene, foam, "movable")
-    reasons = {"relaxation": "family foam", "sliding": "movable", "cover": "cover_n_m"}
-    reasons |= {"tipping": "base_m and height_m", "noise": "effects.add"}
-    assert required.items() >= reasons.items()
-    fixed = required_effects(trial_scene, foam, "fixed")
-    assert not {"sliding", "stribeck"} & set(fixed)
-
-
 def test_a_spread_around_0_calls_for_its_effect_in_movable_objects():
     wall = scenes.one_object(name="wall")
     box = scenes.one_object(conditions=["fixed", "movable"], foot_m=0.2, **MOVES)

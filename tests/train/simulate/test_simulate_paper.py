@@ -48,14 +48,6 @@ def test_eighteen_objects_ten_in_both_conditions(cody18):
 
 
 @pytest.mark.slow
-def test_each_trial_is_felt_and_belongs_to_the_papers_tasks(dataset):
-    assert dataset.untouched == ()
-    assert len(dataset.trials) == 140
-    assert dataset.tasks == ("category", "mobility", "object", "softness")
-    assert dataset.chain is not None
-
-
-@pytest.mark.slow
 def test_headline_accuracies_differ_from_the_papers_by_the_chance_of_both_samples(
     cody18,
     dataset,

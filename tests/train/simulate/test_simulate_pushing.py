@@ -11,7 +11,7 @@ import pytest
 from tests.train.simulate.scenes import make, one_object, run
 from train.simulate import scene as scenes
 from train.simulate.contact import GRAVITY
-from train.simulate.effects import base, sliding, stribeck, tipping
+from train.simulate.effects import stribeck
 from train.simulate.engine import run_physics
 from train.simulate.plan import kinds, make_plan
 
@@ -59,16 +59,6 @@ class TestTurning:
         total = turned.counts[0].sum(axis=(1, 2)) / 1000.0
         np.testing.assert_allclose(total, turned.force[0], atol=0.05)
 
-    def test_off_its_middle_it_is_lighter_by_its_own_turn(self):
-        # A free disc of mass m, pushed e beside its middle: 1 / m + e^2 / (m R^2 / 2).
-        aside = 0.06
-        radius = 0.12
-        felt = 1.0 / (1.0 / MASS + aside**2 / (0.5 * MASS * radius**2))
-        batch = push(aside_m=aside, foot_m=2.0 * radius)
-        assert batch.trials.states["sliding"].inertia[0] == pytest.approx(
-            felt, rel=1e-12
-        )
-
 
 class TestSlope:
     @pytest.mark.parametrize(
@@ -110,38 +100,6 @@ class TestToppling:
         fallen = slide >= lies - 1e-12
         assert fallen.any()
         assert (slide[np.argmax(fallen) :] == lies).all()
-
-    def test_beyond_its_balance_it_falls_as_a_pendulum_does(self, batch):
-        # s'' = k (s - travel) / m about the balance: m v^2 - k (s - travel)^2 stays as
-        # it is.
-        state = batch.trials.states["tipping"]
-        mover = batch.trials.states["sliding"]
-        travel = state.travel[0]
-        lies = mover.lies[0]
-        slide = batch.traces["slide_m"][0]
-        force = batch.force[0]
-        speed = np.gradient(slide, batch.t)
-        free = (slide > 1.2 * travel) & (slide < 0.8 * lies) & (force == 0.0)
-        free[1:-1] &= (force[:-2] == 0.0) & (force[2:] == 0.0)
-        assert free.sum() >= 5
-        stiffness = state.force[0] / travel
-        energy = mover.inertia[0] * speed**2 - stiffness * (slide - travel) ** 2
-        scale = (mover.inertia[0] * speed**2)[free].max()
-        assert np.ptp(energy[free]) < 0.03 * scale
-
-    def test_let_go_it_falls_back_onto_its_foot(self, batch):
-        t = batch.trials
-        mover = t.states["sliding"]
-        mover.slide[:] = 1e-6
-        mover.speed[:] = 0.0
-        t.contact.y[:] = -0.1
-        tipping.drag(t.everyone)
-        sliding.give_way(t.everyone)
-        base.press(t.everyone)
-        sliding.move(t.everyone)
-        assert mover.slide.tolist() == [0.0]
-        assert mover.speed.tolist() == [0.0]
-        assert (t.contact.loads == 0.0).all()
 
 
 def test_what_slides_at_the_skin_bears_force_at_every_step_of_a_frame():

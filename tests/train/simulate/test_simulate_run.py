@@ -135,9 +135,6 @@ class TestSensors:
         assert 0.6 < dead.valid.mean() < 0.8
         assert not dead.frames[:, ~dead.valid].any()
 
-    def test_unknown_dead_taxels_are_not_told(self):
-        assert recorded(dead_taxels={"part": 0.3, "known": 0}).valid is None
-
     def test_jitter_shifts_the_times(self):
         between = np.diff(recorded(jitter={"s": 0.002}).t)
         assert len(np.unique(between.round(6))) > 10

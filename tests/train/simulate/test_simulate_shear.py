@@ -9,13 +9,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 
-from edge.errors import InputError
 from tests.train.simulate.scenes import movable, one_object, run, scene
 from train.simulate.effects import shear
 from train.simulate.effects.shear import shared
 from train.simulate.run import recordings
-
-STICKY_FOAM = one_object(family="foam", skin_friction=5.0, width_m=0.2)
 
 
 def box(mu):
@@ -64,28 +61,12 @@ def test_springs_share_a_pull_until_each_slips(limits, part):
     assert shares.sum() == pytest.approx(pull, rel=1e-14)
 
 
-def test_a_pull_beyond_all_limits_is_shared_by_them():
-    shares = shared(np.array([9.0]), np.array([[1.0], [2.0], [0.0]]))[:, 0]
-    assert shares.tolist() == pytest.approx([3.0, 6.0, 0.0], rel=1e-15)
-
-
 def test_the_sum_along_the_rows_is_the_pull_that_the_arm_feels():
     batch = felt(box(0.4), "tilt")
     along = traction(batch)[0].sum(axis=(0, 1))
     pull = batch.trials.contact.pull
     assert (np.abs(pull) > 0.01).all()
     assert_allclose(along, pull, rtol=1e-9)
-
-
-def test_taxels_that_all_stick_bear_alike():
-    batch = felt(STICKY_FOAM, after_s=0.3)
-    t = batch.trials
-    along = traction(batch)[0]
-    loaded = t.touch.image > 0.0
-    assert loaded.sum() > 10
-    alike = t.contact.pull / loaded.sum(axis=(0, 1))
-    expected = np.where(loaded, alike, 0.0)
-    assert_allclose(along, expected, rtol=1e-12)
 
 
 def test_taxels_that_all_slip_bear_friction_times_their_load():
@@ -110,10 +91,6 @@ def test_a_face_that_turns_takes_the_normal_with_it():
     assert np.count_nonzero(expected) > 20
     assert_allclose(around, expected, rtol=1e-12)
     assert not along.any()
-
-
-def test_without_skin_friction_there_is_no_shear():
-    assert not traction(felt(one_object())).any()
 
 
 def test_nothing_but_the_shear_differs_from_the_scene_without_it():
@@ -147,8 +124,3 @@ def test_a_dead_taxel_has_no_shear():
     assert not recording.valid.all()
     assert not recording.shear[:, ~recording.valid].any()
     assert recording.shear[:, recording.valid].any()
-
-
-def test_a_skin_of_one_axis_cannot_have_it():
-    with pytest.raises(InputError, match=r"it needs skin.axes = 3"):
-        scene(box(0.4), effects={"add": ["shear"]})

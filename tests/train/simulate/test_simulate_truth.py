@@ -1,6 +1,5 @@
 """Trials do what their labels say, and families are drawn from their ranges."""
 
-import math
 from dataclasses import replace
 
 import numpy as np
@@ -46,15 +45,6 @@ class TestLabels:
         redrawn = [r.meta["simulation"]["redrawn"] for _, r in simulate(boxes)]
         assert np.count_nonzero(redrawn) == stuck
         assert write(boxes, tmp_path).redrawn == {"moved too little": stuck}
-
-    def test_redraws_do_not_depend_on_the_batch(self, monkeypatch):
-        trial_scene = scene(BOX, trials={"count": 4, "lead_s": 0.1, "after_s": 1.4})
-        together = list(simulate(trial_scene))
-        monkeypatch.setattr(engine, "MOST_TRIALS", 1)
-        single = dict(simulate(trial_scene))
-        for name, trial in together:
-            assert trial.frames.tobytes() == single.pop(name).frames.tobytes()
-        assert single == {}
 
     def test_a_movable_object_that_never_slides_is_refused(self):
         heavy = scene({**BOX, "mass_kg": 20.0})
@@ -144,16 +134,3 @@ class TestFamilies:
     def test_a_family_that_makes_no_sense_is_refused(self, change, says):
         with pytest.raises(InputError, match=says):
             scene(families=[{**FAMILY, **change}])
-
-
-class TestLimits:
-    def test_the_stroke_ends_at_the_joints_limits(self):
-        trial_scene = scene(
-            {**BOX, "conditions": ["fixed"], "width_m": 0.02},
-            trials={"count": 1, "after_s": 8.0},
-            motion={"rate_deg_s": [60.0, 0.0, 0.0, 0.0, 0.0]},
-        )
-        batch = run(trial_scene)
-        assert math.degrees(batch.joints[0, :, 0].max()) <= 120.0
-        force = batch.force[0]
-        assert force[-1] == pytest.approx(force[-500], rel=1e-3)

@@ -13,15 +13,6 @@ def test_a_stream_is_the_same_on_every_machine():
     assert streams.key("noise") == tuple(np.frombuffer(digest, dtype="<u4").tolist())
 
 
-@pytest.mark.parametrize("seed", [2012, 2**63 - 1])
-def test_a_stream_is_numpys_own_of_the_seed_and_its_words(seed):
-    words = (*streams.key("noise"), *streams.key("soft"), 5)
-    for trial, spawn_key in ((5, words), (None, words[:-1])):
-        sequence = np.random.SeedSequence(seed, spawn_key=spawn_key)
-        want = np.random.Generator(np.random.PCG64(sequence)).random(4)
-        assert_array_equal(streams.stream(seed, "noise", "soft", trial).random(4), want)
-
-
 @pytest.mark.parametrize("kind", ["random", "standard_normal"])
 def test_a_trials_draw_does_not_depend_on_the_trials_beside_it(kind):
     every = streams.draws(3, "yaw", "soft", np.arange(1000), kind)

@@ -42,10 +42,7 @@ def test_the_points_come_fastest_first(front):
         ("accurate", 901),
         ("balanced", 200),  # of windows within 0.9 s
         ("200", 200),
-        ("901", 901),
-        ("0.6", 100),
         ("0.61", 200),
-        ("0.9", 901),
     ],
 )
 def test_a_point_is_chosen_by_name_by_time_or_by_accuracy(front, wish, milliseconds):
@@ -60,7 +57,6 @@ def test_a_point_is_chosen_by_name_by_time_or_by_accuracy(front, wish, milliseco
         ("0.95", "the most accurate point reaches 0.900"),
         ("quick", "must be fast, balanced, accurate"),
         ("nan", "not 'nan'"),
-        ("-1", "not '-1'"),
         ("0", "not '0'"),
     ],
 )
@@ -73,7 +69,6 @@ def test_a_wish_that_no_point_fulfils_is_one_sentence(front, wish, message):
 @pytest.mark.parametrize(
     ("content", "message"),
     [
-        ("[]", "not a front.json"),
         ("{", "not a front.json"),
         (text(points=[]), "not a front.json"),
         (text().replace('"window_s": 0.1', '"window_s": -1'), "not a front"),

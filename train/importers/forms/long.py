@@ -11,7 +11,7 @@ from edge.config import short_text
 from edge.errors import InputError
 from train.importers.columns import columns, named_times
 from train.importers.options import TableOptions
-from train.importers.table import Table, require_filled, require_unique
+from train.importers.table import Table, require_unique
 
 TAXEL = re.compile(
     r"(?:taxel|sensor|channel|electrode|cell|pin)(?:[ _]?(?:id|no|nr|number|index))?",
@@ -32,20 +32,20 @@ def trials_in(table: Table, options: TableOptions) -> Iterator[Table]:
     if "trial" not in table.names:
         yield _wide(table, options)
         return
-    require_filled(table, "trial")
+    _require_filled(table, "trial")
     tasks = _tasks_in(table, options.task)
     for name, rows in table.data.groupby("trial", sort=False):
-        where = f"{table.where}: trial {name}"
         part = replace(
             table,
-            where=where,
+            where=f"{table.where}: trial {name}",
             name=str(name),
             data=rows.drop(columns=["trial", *tasks]),
             file_names=tuple(table.file_names or table.names),
-            labels=_labels_in(where, rows[tasks]),
             label=f"column {', column '.join(tasks)}" if tasks else "none",
         )
-        yield _wide(part, options)
+        labels = {task: _label_in(part.where, rows[task]) for task in tasks}
+        stated = {task: label for task, label in labels.items() if label}
+        yield _wide(replace(part, labels=stated), options)
 
 
 def _tasks_in(table: Table, task: str) -> list[str]:
@@ -58,19 +58,32 @@ def _tasks_in(table: Table, task: str) -> list[str]:
     return [name for name in table.names if name == task or values.get(name) == 1]
 
 
-def _labels_in(where: str, rows: pd.DataFrame) -> dict[str, str]:
-    """The labels in the rows of a trial."""
-    labels = {}
-    for task, column in rows.items():
-        first, *further = map(plain, column.astype(object).fillna("").unique())
-        if further:
-            raise InputError(
-                f"{where}: {task} changes, from {short_text(first)} to "
-                f"{short_text(further[0])}"
-            )
-        if first:
-            labels[str(task)] = first
-    return labels
+def _label_in(where: str, cells: pd.Series) -> str:
+    """The label in the rows of a trial.
+
+    Raises:
+        InputError: there are several.
+    """
+    labels = list(map(plain, cells.astype(object).fillna("").unique()))
+    if labels[1:]:
+        raise InputError(
+            f"{where}: {cells.name} changes, as in {short_text(labels[:2])}"
+        )
+    return labels[0]
+
+
+def _require_filled(table: Table, name: str) -> None:
+    """Refuse an empty cell in a column that tells rows apart.
+
+    Raises:
+        InputError: a cell is empty; the sentence names its line.
+    """
+    empty = table.data[name].isna()
+    if empty.any():
+        raise InputError(
+            f"{table.where}: {empty.index.name} {empty.idxmax()} has no {name}; enter "
+            "it, or leave the row out"
+        )
 
 
 def _wide(table: Table, options: TableOptions) -> Table:
@@ -79,28 +92,28 @@ def _wide(table: Table, options: TableOptions) -> Table:
     values = list(filter(VALUE.fullmatch, table.names))
     if len(taxels) != 1 or len(values) != 1:
         return table
-    taxel = taxels[0]
-    require_filled(table, taxel)
-    further = [name for name in table.names if name not in (taxel, values[0])]
+    (taxel,) = taxels
+    _require_filled(table, taxel)
+    further = [name for name in table.names if name not in (taxel, *values)]
     times = named_times(table) or further
     if options.time:
         times = columns(table, options.time)
     if len(times) != 1:
         raise InputError(
-            f"{table.where}: needs a time beside {taxel} and {values[0]}, which --time "
-            "names"
+            f"{table.where}: needs a time beside {taxel} and {values[0]}; give --time COL, "
+            f"among {short_text(further)}"
         )
-    time = times[0]
+    (time,) = times
     _check(table, time, taxel)
     wide = table.data.pivot(index=time, columns=taxel, values=values[0])
     wide = wide[sorted(wide.columns, key=_natural)].rename(columns=plain)
     require_unique([time, *wide.columns])
-    form = [f'ignored: "{name}"' for name in further if name != time]
+    ignored = [f'ignored: "{name}"' for name in further if name != time]
     return replace(
         table,
         data=wide.reset_index(),
         named=False,
-        form=(*table.form, *form),
+        form=(*table.form, *ignored),
         file_names=tuple(wide.columns),
     )
 

@@ -10,11 +10,8 @@ import csv
 import io
 import re
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
-from itertools import zip_longest
-from typing import Any
 
 import pandas as pd
 
@@ -27,16 +24,20 @@ from train.importers.table import EMPTY, Table, require_unique
 MARKS = "\t;|,"
 """Separators; a text with none of them in most lines is separated by blanks."""
 COMMENT = tuple("#%")
-COMMA = r"(?<![^\s;|\"])[+-]?\d*,\d+(?:[eE][+-]?\d+)?(?![^\s;|\"])"
+COMMA = re.compile(r"(?<![^\s;|\"])[+-]?\d*,\d+(?:[eE][+-]?\d+)?(?![^\s;|\"])")
 """A cell with a decimal comma, where commas separate no cells."""
 UNNAMED = re.compile(r"Unnamed: \d+")
 """What pandas calls a column without a name."""
 UNIT = re.compile(r"[\[(]?(s|sec|seconds|ms|us|µs|ns)[\])]?", re.I)
 """A cell of a row of units, below the time."""
+NO_NUMBER = ["", *"nan NaN NAN NA N/A n/a null NULL None - -- #N/A".split()]
+"""Cells of a column of numbers that are empty."""
 SAMPLE = 200
 """Rows that tell the columns of numbers."""
 MOST_ODD = 0.1
 """Share of the lines among the rows that may have another number of cells."""
+ENCODINGS = {"utf-16": "UTF-16", "cp1252": "Windows-1252"}
+"""Names of those that are worth saying."""
 
 
 def is_form(file: File) -> bool:
@@ -46,37 +47,8 @@ def is_form(file: File) -> bool:
 
 def tables(file: File, options: TableOptions) -> Iterator[Table]:
     """The table in a text."""
-    form = [{"utf-16": "UTF-16", "cp1252": "Windows-1252"}.get(file.encoding, "")]
-    yield table_of(str(file.path), file.lines, form)
-
-
-@dataclass(frozen=True, slots=True)
-class Row:
-    """A line of a text that is a row of its table.
-
-    Attributes:
-        line: its number, from 1.
-        text: of the line.
-        mark: the sign between its cells; empty for blanks.
-    """
-
-    line: int
-    text: str
-    mark: str
-
-    @property
-    def cells(self) -> list[str]:
-        """The cells of the line."""
-        if not self.mark:
-            return self.text.split()
-        reader = csv.reader([self.text], delimiter=self.mark, skipinitialspace=True)
-        return [UNNAMED.sub("", cell.strip()) for cell in next(reader, [])]
-
-    def fits(self, columns: Sequence[int]) -> bool:
-        """Whether there are numbers in some columns, but for empty cells."""
-        row = self.cells
-        cells = [row[i] for i in columns if row[i]]
-        return bool(cells) and all(map(is_number, cells))
+    note = ENCODINGS.get(file.encoding, "")
+    yield table_of(str(file.path), file.lines, note)
 
 
 def is_number(cell: str) -> bool:
@@ -87,90 +59,84 @@ def is_number(cell: str) -> bool:
     return False
 
 
-def table_of(where: str, lines: Sequence[str], form: Sequence[str] = ()) -> Table:
+def table_of(where: str, lines: Sequence[str], note: str = "") -> Table:
     """The table in the lines of a text.
 
     Args:
         where: names the file in errors.
         lines: of the text.
-        form: how it was read.
+        note: how it was read.
 
     Raises:
         InputError: there is none, or its lines have different numbers of cells.
     """
     with about(where):
-        return _table(where, lines, form)
-
-
-def _table(where: str, lines: Sequence[str], form: Sequence[str]) -> Table:
-    mark = _mark(lines)
-    rows, odd = _rows(lines, mark)
-    columns = _number_columns(rows)
-    first = next((i for i, row in enumerate(rows) if row.fits(columns)), None)
-    if first is None:
-        raise InputError(
-            f"looks like a text without a table, as its lines are not columns "
-            f"of numbers: {short_text(next(filter(str.strip, lines), ''))}"
-        )
-    names, units = _heading(lines, rows, first, mark)
-    data = rows[first:]
-    notes = [*form, _head_note(lines, rows), _odd_note(odd, data)]
-    if not names:
-        notes.append("no header")
-    places = range(1, len(data[0].cells) + 1)
-    unnamed = "column {} unnamed" if names else "{}"
-    unique = [
-        name or unnamed.format(place) for place, name in zip_longest(places, names)
-    ]
-    require_unique(unique)
-    decimal = _decimal(data, mark)
-    if decimal == ",":
-        notes.append("decimal commas")
-    table = _parsed(data, unique, mark, decimal)
+        mark = _mark(lines)
+        rows = _rows(lines, mark)
+        columns = _number_columns(list(rows.values()), mark)
+        first = _first(rows, mark, columns)
+        names, units = _heading(lines, rows, first, mark)
+        notes = [note, _odd_note(lines, rows, first)]
+        if not any(names):
+            notes.append("no header")
+        unnamed = "column {} unnamed" if any(names) else "{}"
+        unique = [name or unnamed.format(i) for i, name in enumerate(names, 1)]
+        require_unique(unique)
+        data = {line: text for line, text in rows.items() if line >= first}
+        decimal = "."
+        if mark != "," and any(map(COMMA.search, data.values())):
+            decimal = ","
+            notes.append("decimal commas")
+        empty_cells = {name: [""] for name in unique}
+        empty_cells |= {unique[i]: NO_NUMBER for i in columns}
+        table = _parsed(data, mark, decimal, empty_cells)
     # A separator at the ends of rows makes a column without a name or a value.
-    named = set(names or unique[:-1])
+    named = set(filter(None, names or unique[:-1]))
     empty = table.columns[table.isna().all()].difference(named)
     return Table(
         where,
         table.drop(columns=empty),
-        named=bool(names),
+        named=any(names),
         form=tuple(filter(None, notes)),
         file_names=tuple(unique),
         units=dict(zip(unique, units, strict=False)),
     )
 
 
-def _decimal(rows: Sequence[Row], mark: str) -> str:
-    """The sign before a fraction."""
-    if mark != "," and any(re.search(COMMA, row.text) for row in rows):
-        return ","
-    return "."
+def _parsed(
+    rows: Mapping[int, str],
+    mark: str,
+    decimal: str,
+    empty_cells: Mapping[str, list[str]],
+) -> pd.DataFrame:
+    """The columns of rows; the index is the line of each.
 
-
-def _head_note(lines: Sequence[str], rows: Sequence[Row]) -> str:
-    """Where the table begins, if other lines are above it."""
-    above = [line for line in lines[: rows[0].line - 1] if line.strip()]
-    is_plain = all(line.startswith((*COMMENT, "sep=")) for line in above)
-    return "" if is_plain else f"the table begins at line {rows[0].line}"
-
-
-def _odd_note(odd: Sequence[int], rows: Sequence[Row]) -> str:
-    """Which lines among the rows were left out.
-
-    Raises:
-        InputError: they are too many to be slips.
+    Texts and the names of trials stand as they are: a label may be `NA`, and trial 007
+    is not trial 7.
     """
-    among = [line for line in odd if rows[0].line < line < rows[-1].line]
-    if len(among) > MOST_ODD * len(rows):
-        raise InputError(
-            f"line {among[0]} has another number of values than most lines, "
-            f"which have {len(rows[0].cells)}, and so have {len(among) - 1} others; "
-            "remove them, or part the file"
-        )
-    if not among:
-        return ""
-    lines = counted(len(among), "line")
-    return f"{lines} of another width left out, the first is line {among[0]}"
+    table = pd.read_csv(
+        # As bytes, for a `StringIO` takes four for each character.
+        io.BytesIO("\n".join(rows.values()).encode()),
+        sep=mark or r"\s+",
+        header=None,
+        names=list(empty_cells),
+        index_col=False,
+        skipinitialspace=True,
+        dtype={"trial": str},
+        decimal=decimal,
+        keep_default_na=False,
+        na_values=dict(empty_cells),
+        low_memory=False,
+    )
+    return table.set_axis(pd.Index([*rows], name="line"))
+
+
+def _cells(text: str, mark: str) -> list[str]:
+    """The cells of a line."""
+    if not mark:
+        return text.split()
+    reader = csv.reader([text], delimiter=mark, skipinitialspace=True)
+    return [UNNAMED.sub("", cell.strip()) for cell in next(reader, [])]
 
 
 def _mark(lines: Sequence[str]) -> str:
@@ -182,87 +148,91 @@ def _mark(lines: Sequence[str]) -> str:
     return ""
 
 
-def _rows(lines: Sequence[str], mark: str) -> tuple[list[Row], list[int]]:
-    """The rows that have as many cells as most, and the numbers of the other lines."""
-    rows = [
-        Row(number, line, mark)
+def _rows(lines: Sequence[str], mark: str) -> dict[int, str]:
+    """{number, from 1: text} of the lines that have as many cells as most."""
+    widths = {
+        number: len(_cells(line, mark))
         for number, line in enumerate(lines, 1)
         if line.strip() and not line.startswith(COMMENT)
-    ]
-    if not rows:
+    }
+    if not widths:
         raise InputError(EMPTY)
-    widths = [len(row.cells) for row in rows]
-    counts = Counter(widths)
+    counts = Counter(widths.values())
     usual = max(counts, key=lambda width: (counts[width], width))
-    fitting = []
-    odd = []
-    for row, width in zip(rows, widths, strict=True):
-        text = row.text.rstrip()
+    rows = {}
+    for number, width in widths.items():
+        text = lines[number - 1].rstrip()
         if width == usual + 1 and mark and text.endswith(mark):
-            fitting.append(Row(row.line, text.removesuffix(mark), mark))
+            rows[number] = text.removesuffix(mark)
         elif width == usual:
-            fitting.append(row)
-        else:
-            odd.append(row.line)
-    return fitting, odd
+            rows[number] = lines[number - 1]
+    return rows
 
 
-def _number_columns(rows: Sequence[Row]) -> list[int]:
+def _number_columns(rows: Sequence[str], mark: str) -> list[int]:
     """The columns of which most cells are numbers."""
-    columns = []
     # The names stand in the upper half.
-    sample = [row.cells for row in rows[len(rows) // 2 :][-SAMPLE:]]
-    for i, cells in enumerate(zip(*sample, strict=True)):
-        texts = [cell for cell in cells if cell]
-        if 2 * sum(map(is_number, texts)) > len(texts):
-            columns.append(i)
-    return columns
+    sample = [_cells(row, mark) for row in rows[len(rows) // 2 :][-SAMPLE:]]
+    return [
+        i
+        for i, cells in enumerate(zip(*sample, strict=True))
+        if 2 * sum(map(is_number, cells)) > sum(map(bool, cells))
+    ]
+
+
+def _first(rows: Mapping[int, str], mark: str, columns: Sequence[int]) -> int:
+    """The line of the first row with numbers in some columns, but for empty cells.
+
+    Raises:
+        InputError: there is none.
+    """
+    for line, text in rows.items():
+        row = _cells(text, mark)
+        cells = [row[i] for i in columns if row[i]]
+        if cells and all(map(is_number, cells)):
+            return line
+    raise InputError(
+        "looks like a text without a table, as its lines are not columns of numbers: "
+        f"{short_text(next(iter(rows.values())))}"
+    )
 
 
 def _heading(
-    lines: Sequence[str], rows: Sequence[Row], first: int, mark: str
+    lines: Sequence[str], rows: Mapping[int, str], first: int, mark: str
 ) -> tuple[list[str], list[str]]:
-    """The names of the columns, if there are any, and their units where a row has them."""
-    if first:
-        above = rows[first - 1].cells
-        before = rows[first - 2].cells if first > 1 else []
-        if any(map(UNIT.fullmatch, above)) and not any(map(is_number, before)):
-            return before or above, [cell.strip("[]()") for cell in above]
-        return above, []
-    comments = [line for line in lines[: rows[0].line] if line.startswith(COMMENT)]
-    if comments:
-        names = Row(0, comments[-1].lstrip("#% "), mark).cells
-        if len(names) == len(rows[0].cells) and not is_number(names[0]):
-            return names, []
-    return [], []
+    """The names of the columns, empty without any, and their units where a row has
+    them."""
+    width = len(_cells(rows[first], mark))
+    above = [_cells(text, mark) for line, text in rows.items() if line < first]
+    if above:
+        if any(map(UNIT.fullmatch, above[-1])) and above[:-1]:
+            return above[-2], [cell.strip("[]()") for cell in above[-1]]
+        return above[-1], []
+    comments = [line for line in lines[:first] if line.startswith(COMMENT)]
+    names = _cells(comments[-1].lstrip("#% "), mark) if comments else []
+    is_head = len(names) == width and not is_number(names[0])
+    return names if is_head else [""] * width, []
 
 
-def _parsed(
-    rows: Sequence[Row], names: list[str], mark: str, decimal: str
-) -> pd.DataFrame:
-    """The columns of rows; the index is the line of each.
+def _odd_note(lines: Sequence[str], rows: Mapping[int, str], first: int) -> str:
+    """Which lines among the rows were left out.
 
-    Texts and the names of trials stand as they are: a label may be `None` or `NA`, and
-    trial 007 is not trial 7. In a column of numbers such words are empty cells.
+    Raises:
+        InputError: they are too many to be slips.
     """
-    # As bytes, for a `StringIO` takes four for each character.
-    body = "\n".join(row.text for row in rows).encode()
-
-    def read(**options: Any) -> pd.DataFrame:
-        return pd.read_csv(
-            io.BytesIO(body),
-            sep=mark or r"\s+",
-            header=None,
-            names=names,
-            index_col=False,
-            skipinitialspace=True,
-            **options,
+    last = max(rows)
+    odd = [
+        number
+        for number, line in enumerate(lines[first:last], first + 1)
+        if number not in rows and line.strip() and not line.startswith(COMMENT)
+    ]
+    if len(odd) > MOST_ODD * len(rows):
+        raise InputError(
+            f"line {odd[0]} has another number of values than most lines, and so have "
+            f"{len(odd) - 1} others; remove them, or part the file"
         )
-
-    table = read(decimal=decimal, low_memory=False)
-    numeric = table.select_dtypes(["number", "bool"]).columns.drop("trial", "ignore")
-    texts = [name for name in names if name not in numeric]
-    if texts:
-        cells = {"keep_default_na": False, "na_values": [""]}
-        table[texts] = read(usecols=texts, dtype=str, **cells)[texts]
-    return table.set_axis(pd.Index([row.line for row in rows], name="line"))
+    count = counted(len(odd), "line")
+    note = (
+        f"{count} of another width left out, the first is line {odd[0]}" if odd else ""
+    )
+    return note

@@ -550,7 +550,7 @@ function trialRow(trial) {
   return row;
 }
 
-function drawUndo([last]) {
+function drawUndo(last) {
   $("undo").hidden = !last;
   if (last) say("undo", `Undo: ${last.command}`);
 }
@@ -583,7 +583,7 @@ function draw(picture) {
   drawNotices(picture);
 }
 
-$("undo").onclick = () => act({ do: "undo", time: list.undo[0].time });
+$("undo").onclick = () => act({ do: "undo", time: list.undo.time });
 $("all").onchange = () => tickAll($("all").checked);
 $("accept-ticked").onclick = async () => await change("accept", ticked()) && tickAll(false);
 $("label-ticked").onclick = () => edit($("ticked"), ticked());

@@ -21,10 +21,6 @@ def test_a_program_gets_the_metadata_with_size_and_time(edge):
     assert labels == {name: task.labels for name, task in INFO.tasks.items()}
 
 
-def test_the_model_is_taken_by_place_or_by_its_option(edge):
-    assert edge("info", "--model", demo.MODEL) == edge("info", demo.MODEL)
-
-
 def test_the_doubt_about_names_says_what_it_is_worth():
     stopping = INFO.stopping["object"]
     worth = {"unknown": 0.46, "unsure": 0.21, "sure": 0.09, "known": 0.02}
@@ -48,7 +44,7 @@ def test_a_person_gets_sentences(edge, monkeypatch):
     for name, task in INFO.tasks.items():
         assert f"{name}: {task.accuracy:.1%} accurate (nested)" in out
     assert "Skin: 16 x 24 taxels, closed around" in out
-    assert f"Fitted on {INFO.rows} trials" in out
+    assert f"Compares with {INFO.rows} trials" in out
     assert "Of touches of each object that it has not met" in out
     assert max(map(len, out.splitlines())) <= 80
 

@@ -6,6 +6,7 @@ from pathlib import Path
 import onnx
 import pytest
 
+from edge import writing
 from edge.app.commands import install
 from edge.decide.model import Model
 from edge.decide.verify import golden_of
@@ -53,8 +54,11 @@ def test_a_verified_model_takes_the_place_of_the_former_one_which_is_kept(
     assert running.with_name("model.onnx.former").read_bytes() == b"former model"
 
 
-def test_only_one_program_at_a_time_installs_into_a_folder(installed, running):
-    with install.alone(running.parent):
+def test_only_one_program_at_a_time_installs_into_a_folder(
+    installed, running, monkeypatch
+):
+    monkeypatch.setattr(writing, "LOOKS", 1)
+    with writing.alone(running.parent, "installs a model"):
         assert installed()[0] == 2
     assert running.read_bytes() == b"former model"
     assert installed()[0] == 0
@@ -178,58 +182,3 @@ def test_a_model_that_does_not_verify_leaves_the_former_one(
     assert status == 2
     assert str(new.parent) in err
     assert running.read_bytes() == b"former model"
-
-
-def test_a_service_that_does_not_run_with_the_new_model_gets_the_former_one(
-    installed,
-    running,
-    monkeypatch,
-):
-    restarted = []
-    monkeypatch.setattr(install, "restart", restarted.append)
-    monkeypatch.setattr(install, "runs_on", lambda is_active: False)
-    status, _, err = installed("--service", "robot")
-    assert status == 1
-    assert "the former model is back" in err
-    assert running.read_bytes() == b"former model"
-    assert restarted == ["robot", "robot"]
-
-
-def test_a_machine_without_systemd_is_told_so(installed, running, monkeypatch):
-    monkeypatch.setenv("PATH", "")
-    status, _, err = installed("--service", "robot")
-    assert status == 2
-    assert "robot cannot be restarted with systemctl: No such file or directory" in err
-    assert "the former model is back" in err
-    assert running.read_bytes() == b"former model"
-
-
-@pytest.fixture
-def looks(tmp_path, monkeypatch):
-    """What a stand-in for systemctl says of the service, a text for each look."""
-    program = tmp_path / "systemctl"
-    program.write_text("#!/bin/sh\ncat state\n")
-    program.chmod(0o755)
-    monkeypatch.chdir(tmp_path)
-    monkeypatch.setenv("PATH", f"{tmp_path}:/usr/bin:/bin")
-    is_active = install.is_active_of("robot")
-
-    def look(state):
-        (tmp_path / "state").write_text(state)
-        return is_active()
-
-    return look
-
-
-def test_a_service_that_was_started_again_has_not_run_on(looks):
-    assert looks("ActiveState=active\nNRestarts=0\n")
-    assert looks("ActiveState=active\nNRestarts=0\n")
-    assert not looks("ActiveState=active\nNRestarts=1\n")
-
-
-def test_a_service_is_watched_for_a_minute():
-    looks = iter([True] * 29 + [False])
-    slept = []
-    assert not install.runs_on(lambda: next(looks), sleep=slept.append)
-    assert sum(slept) == install.PROVE_S
-    assert install.runs_on(lambda: True, sleep=slept.append)

@@ -15,15 +15,6 @@ def replay(exported, edge):
     return lambda *arguments: edge(*command, *arguments)
 
 
-def test_a_folder_is_replayed_and_summed_up(replay, recordings):
-    status, events, _ = replay(recordings, "--summary")
-    decisions = [e for e in events if e["event"] == "decision"]
-    keys = {"event", "task", "label", "confidence", "window_s", "onset_s", "latency_ms"}
-    assert status == 0
-    assert len(decisions) == 32
-    assert all(keys <= set(e) for e in decisions)
-
-
 def test_the_summary_counts_what_is_right(replay, recordings):
     _, events, err = replay(recordings, "--summary")
     # Every trial is its own nearest neighbour here, so nothing can be wrong.
@@ -164,18 +155,6 @@ def test_a_label_cannot_send_escape_sequences_to_the_terminal():
     text = summed(("\u202ebox\x9b", "\x1b]0;a\x07")).text()
     assert all(line.isprintable() for line in text.splitlines())
     assert "\\x1b]0;a\\x07" in text
-
-
-def test_two_models_are_compared_on_the_same_recordings(replay, exported, recordings):
-    touches = [recordings / f"{name}.npz" for name in ("hard_0", "soft_0")]
-    status, events, err = replay("--model", exported / "model.onnx", *touches)
-    assert status == 0
-    assert len(decided(events, "task")) == 2 * 2 * 2
-    # Two trials tell nothing.
-    line = "object: 0 gained, 0 lost of 2: +0.0 points (95 % interval -94.3 to +94.3)"
-    assert line in err
-    favoured = f"{exported / 'model.onnx'} was fitted on 2 of these recordings"
-    assert err.count(favoured) == 2
 
 
 def test_a_comparison_counts_what_is_gained_and_lost():

@@ -1,0 +1,42 @@
+"""Cells of a skin, and the tangential force on each."""
+
+import numpy as np
+import pytest
+
+from edge.features.cells import Cells, ShearCells
+from edge.features.vector import feature_vector
+from edge.touch.layout import SkinLayout
+from tests.edge.features.test_zones import FLAT, frame_of
+from tests.edge.touch.pressed import followed
+
+
+@pytest.mark.parametrize("shape", [(3, 5), (17, 31), (1, 700)])
+def test_a_cell_is_the_sum_of_its_readable_taxels_and_dead_cells_are_left_out(shape):
+    rows, cols = shape
+    dead = np.random.default_rng(cols).permutation(rows * cols)[: rows * cols // 2]
+    layout = SkinLayout(rows, cols, dead=tuple(sorted(dead.tolist())))
+    frame = frame_of(cols, shape, 1.0)
+    side = Cells(layout).side
+    squares = [
+        np.s_[row : row + side, col : col + side]
+        for row in range(0, rows, side)
+        for col in range(0, cols, side)
+    ]
+    living = [square for square in squares if layout.alive[square].any()]
+    shear = np.moveaxis(frame.shear, 2, 0)
+    for cells, values in ((Cells(layout), [frame.counts]), (ShearCells(layout), shear)):
+        readable = [value.astype(int) * frame.valid for value in values]
+        sums = [int(value[square].sum()) for value in readable for square in living]
+        assert cells.read(frame).tolist() == sums
+        assert cells.width == len(sums)
+
+
+def test_the_samples_of_each_cell_and_axis_stand_together():
+    frames = [frame_of(seed, FLAT.shape) for seed in range(3)]
+    for i, frame in enumerate(frames):
+        object.__setattr__(frame, "t", 0.5 * i)
+    series = followed(FLAT, frames, features=["taxel_shear"]).series()
+    vector = feature_vector(series, 1.0, 3, ["sqrt_taxel_shear"])
+    known = [(f.shear * f.valid[..., None] / 100.0).reshape(-1, 2) for f in frames]
+    expected = np.transpose(known, (2, 1, 0)).reshape(-1)
+    assert (np.sign(vector) * vector**2).tolist() == pytest.approx(expected, rel=1e-15)
