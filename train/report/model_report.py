@@ -298,10 +298,8 @@ def _sizes(exported: Exported) -> Section:
         f"The model file takes {size:.0f} kB. The candidates' accuracies come from "
         "nested cross-validation, and stand with their 95 % intervals. The times are "
         "for features and decision together on this machine; `edge-classify bench` "
-        "measures those of a board. A star marks the candidate chosen for a task, "
-        "which is the smallest one within a standard error of the best, or among fewer "
-        "than 200 single trials the one with the best grades. A candidate without a "
-        "number was dropped after a few folds, as behind or no better than a cheaper one."
+        "measures those of a board. A star marks the candidate chosen for a task. A "
+        "candidate without a number was dropped after a few folds."
     ]
     return Section(
         "Candidates, sizes and times",
