@@ -148,9 +148,9 @@ def load(
     if isinstance(data, DataSet):
         return Loaded(data, windows, [])
     paths = [data] if isinstance(data, str | Path) else data
-    every = read(paths, progress=options.progress, skip_damaged=options.skip_damaged)
-    recordings, notes = without_copies(every)
-    skipped = (f"warning: {error}; it is left out" for error in every.damaged)
+    readable = read(paths, progress=options.progress, skip_damaged=options.skip_damaged)
+    recordings, notes = without_copies(readable)
+    skipped = (f"warning: {error}; it is left out" for error in readable.damaged)
     notes = [*skipped, *notes]
     if options.fixed_window_s is None and not options.quick:
         seconds = [float(r.t[-1] - r.t[0]) for r in recordings.recordings]
@@ -218,7 +218,7 @@ def calibrate(
     names = settings.features(folds=True)
     dataset = measured.of(sorted(names))
     at_points = dataset.at_points(points, options.samples)
-    LOG.debug("X %s", at_points.shape)
+    LOG.debug("calibrating by vectors (points, trials, columns) %s", at_points.shape)
     classifier = SequentialClassifier(
         settings.choices,
         points,
