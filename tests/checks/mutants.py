@@ -24,6 +24,7 @@ from tests.checks.__main__ import end_with_parent
 from tests.checks.bench import tables
 from tests.checks.bench.program import start
 from tests.conftest import ROOT
+from train.progress import bar
 
 PACKAGES = ("edge", "train", "export", "tests")
 MOST_UNNOTICED = 1 / 50
@@ -161,7 +162,7 @@ def unnoticed(room, changes, folder):
     """
     if not passes(room, folder):
         raise EdgeError(f"a test of {ROOMS[room].tests} fails without a change")
-    for change in changes:
+    for change in bar(changes, desc=room):
         path = folder / change.file
         path.write_text(change.changed())
         if passes(room, folder):
