@@ -20,10 +20,8 @@ from edge.wire.bus.protocol import (
     BusGone,
     BusMissing,
     BusTimeout,
-    read,
-    write,
 )
-from edge.wire.bus.serial_bus import SerialBus, decode, encode, serial_bits
+from edge.wire.bus.serial_bus import SerialBus, decode, encode
 from edge.wire.chips import block
 from edge.wire.chips.block import Block
 from edge.wire.chips.chip import ChipSpec
@@ -230,12 +228,6 @@ def test_a_port_that_another_program_has_open_is_refused_by_name(board, bus):
         BusError, match=f"{board.port}: another program has the port open"
     ):
         SerialBus(board.port, boot_s=0.0)
-
-
-def test_bits_on_the_line_are_those_of_the_packets():
-    exchange = (write(0, block.FRAME), read(0, 154))
-    packets = len(encode(b"\1" * 4)) + len(encode(b"\1" * 155))
-    assert serial_bits(exchange) == 10 * packets
 
 
 @pytest.fixture
