@@ -24,7 +24,7 @@ from tests.conftest import ROOT
     [
         (hard_cases.measure, ["tyes"], "no case's name holds 'tyes'"),
         (elsewhere.measure, ["none", "python"], "no golden files are in none"),
-        (mutants.measure, [1, 1, "train"], "the rooms are skin, bus, "),
+        (mutants.measure, [["train"], 1, 1], "the rooms are skin, bus, "),
     ],
 )
 def test_options_that_would_measure_nothing_are_refused(measure, words, sentence):
