@@ -126,7 +126,7 @@ def run(arguments: argparse.Namespace) -> int:
             suited(former, recording, str(file))
     with single_thread(), on_cluster(arguments.cluster):
         fitted = _fit(arguments)
-        from export.api import measure, save  # loads ONNX
+        from export.api import measure, save  # loads skl2onnx, which takes two seconds
 
         path = arguments.out / "model.onnx"
         size = save(path, fitted, arguments.name, partial(_write_c, arguments))
