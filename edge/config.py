@@ -9,6 +9,7 @@ import os
 import reprlib
 import tomllib
 from collections.abc import Mapping, Sequence
+from dataclasses import MISSING, field, fields
 from typing import Any, Self
 
 from edge.errors import InputError
@@ -94,6 +95,13 @@ def _range_text(low: float, high: float, open_low: bool) -> str:
     if math.isfinite(low):
         return f"a number {'above' if open_low else 'of at least'} {low:g}"
     return "a finite number"
+
+
+def limited(default: Any, **limits: Any) -> Any:
+    """A field of a dataclass with a default and limits: further arguments of the method
+    of `ConfigTable` that reads its type, which one without a default has as
+    `metadata`."""
+    return field(default=default, metadata=limits)
 
 
 class ConfigTable:
@@ -246,6 +254,34 @@ class ConfigTable:
             raise self.fail(key, f"a list of {plural}")
         return tuple(value)
 
+    def values(
+        self, record: type[Any], count: int | None = None, **others: Any
+    ) -> dict[str, Any]:
+        """{field: its value} of a dataclass, each of its type and within its limits (see
+        `limited`); those with a default may be missing.
+
+        Args:
+            record: the dataclass.
+            count: of the numbers in its lists; any where None.
+            others: fields that are read in another way.
+        """
+        values = dict(others)
+        for entry in fields(record):
+            kind = entry.type
+            kind = kind.__name__ if isinstance(kind, type) else str(kind)
+            kind = kind.removesuffix(" | None")
+            default = (
+                entry.default is not MISSING or entry.default_factory is not MISSING
+            )
+            is_absent = not self.has(entry.name) and default
+            if is_absent or entry.name in others:
+                continue
+            limits = dict(entry.metadata)
+            if kind == "tuple[float, ...]":
+                limits.setdefault("count", count)
+            values[entry.name] = _READERS[kind](self, entry.name, **limits)
+        return values
+
     def pair(self, key: str, value: object = REQUIRED) -> tuple[int, int]:
         """[row, col]: the value of the key, or a given value that belongs to it."""
         value = self.get(key) if value is REQUIRED else value
@@ -279,6 +315,18 @@ class ConfigTable:
             sentence = f"{self.prefix}unknown key {key}"
         allowed = ", ".join(dict.fromkeys(self._taken))
         raise InputError(f"{self.where}: {sentence}; allowed: {allowed}")
+
+
+_READERS: dict[str, Any] = {
+    "int": ConfigTable.whole,
+    "float": ConfigTable.number,
+    "bool": ConfigTable.flag,
+    "str": ConfigTable.text,
+    "tuple[float, ...]": ConfigTable.numbers,
+    "tuple[int, ...]": ConfigTable.wholes,
+    "tuple[str, ...]": ConfigTable.texts,
+}
+"""{type of a field: what reads it}."""
 
 
 def parse_toml(text: str, where: str) -> ConfigTable:

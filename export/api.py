@@ -81,7 +81,7 @@ def describe(fitted: Fitted, name: str | None = None) -> ModelInfo:
     dataset = fitted.dataset
     folder, all_trials = names(dataset)
     trials = tuple(all_trials[trial] for trial in fitted.classifier.trials_)
-    packages = ("numpy", "scikit-learn", "skl2onnx", "onnx")
+    packages = ("numpy", "scikit-learn", "onnx")
     return ModelInfo(
         tasks={task: _task(fitted, task) for task in fitted.classifier.choices},
         layout=dataset.layout,

@@ -1,7 +1,6 @@
-"""A fitted `ContactClassifier` as one ONNX graph, through skl2onnx with our own
-converter.
+"""A fitted model as one ONNX graph.
 
-skl2onnx's own k-NN walks the training rows in a Scan, which is slow, breaks ties by the
+skl2onnx's k-NN walks the training rows in a Scan, which is slow, breaks ties by the
 class number and answers NaN with the first row's label. This graph takes all distances
 in one product of whole numbers, obeys the tie rule, and answers a vector that is not
 finite with label -1.
@@ -10,15 +9,13 @@ finite with label -1.
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from functools import partial, reduce
-from typing import Any
+from typing import Protocol
 
 import numpy as np
 import onnx
 from onnx import helper
-from skl2onnx import convert_sklearn, update_registered_converter
-from skl2onnx.common.data_types import DoubleTensorType, Int64TensorType
 
 from edge.arrays import Booleans, Floats, Integers
 from edge.decide.info import METADATA_KEY, ModelInfo
@@ -37,7 +34,16 @@ from train.model.stopping import SequentialClassifier
 
 IR_VERSION = 8
 LARGEST = float(np.finfo(np.float64).max)
-Fitted = ContactClassifier | SequentialClassifier
+
+
+class FittedScorer(Protocol):
+    """What was fitted by another module than those of `train.model` that stand here."""
+
+    def add_nodes(self, build: Builder) -> None:
+        """Add the nodes from `features` to all outputs of the model's metadata."""
+
+
+Fitted = ContactClassifier | SequentialClassifier | FittedScorer
 
 
 def _squares(
@@ -138,10 +144,13 @@ def _vote(
         build.node("GatherND", voters, winner, output=label, batch_dims=1)
 
 
-def _build(model: Fitted) -> Builder:
-    """The nodes from `features` and, with decision points, `decision_point` to all
+def _nearest_trials(
+    build: Builder,
+    model: ContactClassifier | SequentialClassifier,
+    has_label_distances: bool,
+) -> None:
+    """Nodes from `features` and, with decision points, `decision_point` to all
     outputs."""
-    build = Builder()
     points: Sequence[ContactClassifier]
     if isinstance(model, SequentialClassifier):
         points = model.decision_points_
@@ -175,8 +184,7 @@ def _build(model: Fitted) -> Builder:
     for task in model.choices:
         unit = build.node("Gather", units, f"space of {task}", axis=0)
         of_task = (*projected[_spaces(points, task)], unit)
-        _task(build, points, task, of_task, _has_label_distances(model))
-    return build
+        _task(build, points, task, of_task, has_label_distances)
 
 
 Spaces = tuple[FittedSpace, ...]
@@ -333,49 +341,6 @@ def _label_distances(
     build.node("Mul", distances, factors, output=f"{task}_label_distances")
 
 
-def _has_label_distances(model: Fitted) -> bool:
-    """Whether something goes by the distances of a task's labels."""
-    return isinstance(model, SequentialClassifier) or bool(model.products_)
-
-
-def _outputs(model: Fitted) -> Iterator[tuple[str, Any]]:
-    """Names and types; ONNX Runtime derives the sizes from the constants."""
-    numbers = DoubleTensorType([None])
-    table = DoubleTensorType([None, None])
-    for task in model.choices:
-        yield f"{task}_label", Int64TensorType([None])
-        yield f"{task}_scores", table
-        yield f"{task}_distances", table
-        yield f"{task}_neighbours", Int64TensorType([None, None])
-        if _has_label_distances(model):
-            yield f"{task}_label_distances", table
-    yield "out_of_range", numbers
-    if isinstance(model, SequentialClassifier):
-        yield "novelty", numbers
-        yield "remoteness", numbers
-
-
-def _parse(
-    scope: Any, model: Fitted, inputs: list[Any], custom_parsers: Any = None
-) -> Any:
-    operator = scope.declare_local_operator(type(model).__name__, model)
-    operator.inputs.extend(inputs)
-    for name, kind in _outputs(model):
-        operator.outputs.append(scope.declare_local_variable(name, kind))
-    return operator.outputs
-
-
-def _shapes(operator: Any) -> None:
-    """Keep the types with which `_parse` declares the outputs."""
-
-
-def _convert(scope: Any, operator: Any, container: Any) -> None:
-    build = _build(operator.raw_operator)
-    container.nodes.extend(build.made)
-    container.initializers.extend(build.constants.values())
-    container.node_domain_version_pair_sets.add(("", OPSET))
-
-
 def to_onnx(model: Fitted, info: ModelInfo) -> bytes:
     """The fitted tasks and the metadata as a checked, self-contained ONNX file.
 
@@ -383,22 +348,36 @@ def to_onnx(model: Fitted, info: ModelInfo) -> bytes:
     default is the last one, and for each task the output `<task>_label_distances` (n,
     labels); see `edge.decide.info`.
     """
-    kind = type(model)
-    update_registered_converter(
-        kind, kind.__name__, _shapes, _convert, parser=_parse, overwrite=True
+    build = Builder()
+    if isinstance(model, ContactClassifier | SequentialClassifier):
+        _nearest_trials(build, model, info.has_label_distances)
+    else:
+        model.add_nodes(build)
+    inputs = [_declared("features", "float64", [None, info.width])]
+    if info.decision_points_s:
+        inputs.append(_declared("decision_point", "int64", [1]))
+    outputs = [
+        _declared(name, kind, [None, *shape])
+        for name, (kind, shape) in info.outputs.items()
+    ]
+    constants = list(build.constants.values())
+    graph = helper.make_graph(build.made, "edge-classify", inputs, outputs, constants)
+    proto = helper.make_model(
+        graph,
+        opset_imports=[helper.make_opsetid("", OPSET)],
+        ir_version=IR_VERSION,
+        producer_name="edge-classify",
+        doc_string="scaler, PCA and k-NN of a touch; see the metadata",
     )
-    inputs: list[tuple[str, Any]] = [("features", DoubleTensorType([None, info.width]))]
-    if isinstance(model, SequentialClassifier):
-        inputs.append(("decision_point", Int64TensorType([1])))
-    proto = convert_sklearn(
-        model, name="edge-classify", initial_types=inputs, target_opset={"": OPSET}
-    )
-    proto.ir_version = IR_VERSION
-    proto.producer_name = "edge-classify"
-    proto.doc_string = "scaler, PCA and k-NN of a touch; see the metadata"
     helper.set_model_props(proto, {METADATA_KEY: to_json(info)})
     onnx.checker.check_model(proto, full_check=True)
     return with_digest(proto.SerializeToString(deterministic=True))
+
+
+def _declared(name: str, kind: str, shape: Sequence[int | None]) -> onnx.ValueInfoProto:
+    """An input or output."""
+    element = helper.np_dtype_to_tensor_dtype(np.dtype(kind))
+    return helper.make_tensor_value_info(name, element, shape)
 
 
 def with_digest(data: bytes) -> bytes:

@@ -7,6 +7,7 @@ effect, `tests/export/test_c_code.py` a quantity.
 import json
 import re
 import sys
+from dataclasses import replace
 from importlib import import_module
 
 import numpy as np
@@ -15,13 +16,19 @@ from pandas import DataFrame
 
 import edge.app.commands
 import edge.app.sinks
+import edge.decide
 import train
 import train.importers
 from edge import demo
 from edge.app import cli
 from edge.app.commands import run
+from edge.decide.classifier import Classifier
+from edge.decide.engines import ENGINES, SCORERS
+from edge.decide.events import Decided
+from edge.decide.info import Task
 from edge.decide.model import Model
 from edge.record.recording import load
+from export.graph import to_onnx
 from tests.conftest import ROOT
 from train.__main__ import main
 from train.data.feature_sets import SETS
@@ -48,7 +55,7 @@ def test_each_file_and_name_of_the_table_exists(row):
 
 
 def test_the_table_has_each_kind():
-    kinds = "chip|quantity|feature set|lab's data|form|message|effect|sink|subcommand"
+    kinds = "chip|quantity|feature set|lab's data|form|message|effect|scorer|sink|subcommand"
     kinds += "|section"
     for kind, row in zip(kinds.split("|"), TABLE, strict=True):
         assert kind in row
@@ -196,3 +203,82 @@ def test_a_section_is_a_function_in_the_list(recordings, monkeypatch, tmp_path):
     lines = (tmp_path / "toy.csv").read_text().splitlines()
     assert lines[:2] == ["task,classes", "category,2"]
     assert np.all([line.endswith((",2", ",4")) for line in lines[1:]])
+
+
+SCORER = '''"""How far the first feature lies from the mean of each label."""
+import numpy as np
+
+class Means:
+    name = "numpy"
+
+    def __init__(self, arrays, info):
+        self._means = {task: arrays[f"means of {task}"] for task in info.tasks}
+
+    def score(self, vectors, point):
+        outputs = {"out_of_range": np.zeros(len(vectors))}
+        for task, means in self._means.items():
+            distances = np.abs(vectors[:, :1] - means)
+            label = distances.argmin(axis=1)
+            outputs[f"{task}_label"] = label
+            outputs[f"{task}_scores"] = np.eye(len(means))[label]
+            outputs[f"{task}_label_distances"] = distances
+        return outputs
+'''
+
+
+class FittedMeans:
+    """The same as nodes."""
+
+    def __init__(self, means):
+        self.means = means
+
+    def add_nodes(self, build):
+        finite = build.node("Mul", "features", 0.0)
+        build.node("ReduceL1", finite, [1], keepdims=0, output="out_of_range")
+        first = build.node("Gather", "features", [0], axis=1)
+        for task, values in self.means.items():
+            means = build.constant(np.array(values), f"means of {task}")
+            apart = build.node("Sub", first, means)
+            far = build.node("Mul", apart, -1.0)
+            far = build.node("Max", apart, far, output=f"{task}_label_distances")
+            near = build.node("Mul", far, -1.0)
+            name = f"{task}_label"
+            label = build.node("ArgMax", near, axis=1, keepdims=0, output=name)
+            build.node("Gather", np.eye(len(values)), label, output=f"{task}_scores")
+
+
+MEANS = {
+    "category": [0.0, 2.0, 4.0, 6.0],
+    "softness": [0.0, 5.0],
+    "mobility": [0.0, 3.0],
+}
+LABELS = {
+    "category": ("rigid-fixed", "rigid-movable", "soft-fixed", "soft-movable"),
+    "softness": ("rigid", "soft"),
+    "mobility": ("fixed", "movable"),
+}
+FACTORS = {"category": {"softness": [0, 0, 1, 1], "mobility": [0, 1, 0, 1]}}
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_a_scorer_is_a_module_nodes_and_an_entry(monkeypatch, tmp_path, engine):
+    """By itself softness would be soft; the nearest answer in which all agree is not."""
+    module(edge.decide, monkeypatch, tmp_path, SCORER)
+    monkeypatch.setitem(SCORERS, "toy", "edge.decide.toy.Means")
+    tasks = {
+        task: Task(labels, 0, 1, "none", 0.0, factors=FACTORS.get(task, {}))
+        for task, labels in LABELS.items()
+    }
+    blank = {"decision_points_s": (), "stopping": {}, "novelty": None, "usual": {}}
+    info = replace(Model(demo.MODEL).info, tasks=tasks, scorer="toy", **blank)
+    path = tmp_path / "model.onnx"
+    path.write_bytes(to_onnx(FittedMeans(MEANS), info))
+    model = Model(path, engine)
+    decisions = model.decide(np.full(info.width, 2.6))
+    answers = {task: decision.label for task, decision in decisions.items()}
+    expected = {"category": "rigid-movable", "softness": "rigid", "mobility": "movable"}
+    assert answers == expected
+    assert not any(len(decision.neighbours) for decision in decisions.values())
+    touch = load(demo.FOLDER / "pillow-movable.npz")
+    events = [e for e in Classifier(model).classify(touch) if isinstance(e, Decided)]
+    assert {event.task for event in events} == set(tasks)

@@ -108,7 +108,7 @@ def _answer(
         nearest=tuple(map(info.trial, decision.neighbours.tolist())),
         decision=decision,
     ).flagged(
-        as_trained=bool(decision.distances[0] == 0.0),
+        as_trained=bool((decision.distances[:1] == 0.0).any()),
         out_of_range=decision.out_of_range,
         tie=decision.tie,
     )

@@ -4,6 +4,7 @@ missing."""
 from __future__ import annotations
 
 import logging
+from importlib import import_module
 from typing import Any, Protocol
 
 import numpy as np
@@ -16,6 +17,9 @@ from edge.interrupt import delayed
 
 LOG = logging.getLogger("edge.decide")
 ENGINES = ("onnxruntime", "numpy")
+SCORERS = {"knn": "edge.decide.knn.NearestTrials"}
+"""{scorer of a model's metadata: its class in numpy}, which takes the constants and the
+metadata of a file."""
 
 
 class Scorer(Protocol):
@@ -48,11 +52,16 @@ def open_engine(
         engine: one of `ENGINES`; None for ONNX Runtime, or numpy where it is missing.
 
     Raises:
-        InputError: the engine does not exist, or refuses the file.
+        InputError: the engine or the model's scorer does not exist, or it refuses the
+            file.
         EdgeError: ONNX Runtime is asked for and cannot be imported.
     """
     if engine not in (None, *ENGINES):
         raise InputError(f"there is no engine {engine!r}; give {' or '.join(ENGINES)}")
+    if info.scorer not in SCORERS:
+        raise InputError(
+            f"{path}: is scored by {info.scorer!r}, which this edge-classify lacks"
+        )
     if engine != "numpy":
         try:
             with delayed():
@@ -68,9 +77,10 @@ def open_engine(
             )
         else:
             return OnnxRuntime(path, contents, info, onnxruntime)
-    from edge.decide.knn import NearestTrials  # most boards have ONNX Runtime
-
-    return NearestTrials(contents.constants, info)
+    # Most boards have ONNX Runtime.
+    module, _, name = SCORERS[info.scorer].rpartition(".")
+    scorer: Scorer = getattr(import_module(module), name)(contents.constants, info)
+    return scorer
 
 
 class OnnxRuntime:

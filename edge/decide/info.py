@@ -10,6 +10,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 from edge.arrays import Floats
+from edge.config import limited
 from edge.elementary import log, logistic
 from edge.errors import InputError
 from edge.features.names import measures
@@ -24,6 +25,10 @@ if TYPE_CHECKING:
 
 METADATA_KEY = "edge-classify"
 FORMAT = 9
+NOT_NEGATIVE = {"low": 0.0}
+RISK = {"low": 0.0, "high": 1.0, "open_low": True}
+SLOPE = {"low": 1e-12, "high": 1e12}
+"""Limits of fields, see `edge.config.limited`."""
 
 
 @dataclass(frozen=True)
@@ -32,7 +37,7 @@ class Task:
 
     Attributes:
         labels: the answers, in the order of the scores.
-        k: neighbours that vote.
+        k: neighbours that vote; 0 of another scorer than k-NN.
         components: coordinates that distances are measured in.
         scaling: "none", "columns" or "I" to "V" (paper, Eqs. 1 to 5).
         accuracy: nested accuracy of the whole choice at export, 0 to 1.
@@ -46,10 +51,10 @@ class Task:
     """
 
     labels: tuple[str, ...]
-    k: int
-    components: int
+    k: int = field(metadata={"allowed": range(1 << 31)})
+    components: int = field(metadata={"allowed": range(1 << 31)})
     scaling: str
-    accuracy: float
+    accuracy: float = field(metadata={"low": 0.0, "high": 1.0})
     projection: str = "pca"
     features: tuple[str, ...] = ()
     left_out: str = "trial"
@@ -68,8 +73,8 @@ class Novelty:
         limits: (decision points,) scores that few of them exceed.
     """
 
-    typical: tuple[float, ...]
-    limits: tuple[float, ...]
+    typical: tuple[float, ...] = field(metadata=NOT_NEGATIVE)
+    limits: tuple[float, ...] = field(metadata=NOT_NEGATIVE)
 
     def excess(self, decision_point: int, score: float) -> float:
         """The logarithm of a score over the typical one; 0 below it."""
@@ -89,9 +94,9 @@ class Remoteness:
             where none could be.
     """
 
-    limits: tuple[float, ...]
-    middles: tuple[float, ...]
-    slopes: tuple[float, ...]
+    limits: tuple[float, ...] = field(metadata=NOT_NEGATIVE)
+    middles: tuple[float, ...] = field(metadata={"low": 1e-9})
+    slopes: tuple[float, ...] = field(metadata=NOT_NEGATIVE)
     worth: Mapping[str, float] = field(default_factory=dict)
 
     def known(self, decision_point: int, score: float) -> float:
@@ -135,7 +140,7 @@ class StoppingRule:
         last: decision point at which to decide in any case.
     """
 
-    error: float
+    error: float = field(metadata=RISK)
     mean_s: float
     confidence: float
     last: int
@@ -158,16 +163,16 @@ class Stopping:
         remoteness: of the task that names things, and none that is unknown; else None.
     """
 
-    slopes: tuple[float, ...]
+    slopes: tuple[float, ...] = field(metadata=SLOPE)
     intercepts: tuple[float, ...]
-    doubts: tuple[float, ...]
-    slope: float
+    doubts: tuple[float, ...] = field(metadata=NOT_NEGATIVE)
+    slope: float = field(metadata=SLOPE)
     intercept: float
-    doubt: float
+    doubt: float = field(metadata=NOT_NEGATIVE)
     rules: tuple[StoppingRule, ...]
-    trials: int
+    trials: int = field(metadata={"allowed": range(1, 1 << 31)})
     wrong: int
-    risk: float
+    risk: float = field(metadata=RISK)
     remoteness: Remoteness | None = None
 
     def confidence(
@@ -203,8 +208,8 @@ class ModelInfo:
     layout: SkinLayout
     debounce: int
     """Frames in a row that confirm a contact."""
-    window_s: float
-    samples: int
+    window_s: float = field(metadata={"low": 0.0, "high": 3600.0, "open_low": True})
+    samples: int = field(metadata={"allowed": range(2, 10_001)})
     features: tuple[str, ...]
     units: dict[str, str]
     motion_frame: str
@@ -212,7 +217,7 @@ class ModelInfo:
     chain: Chain | None
     rows: int
     """Training trials."""
-    data_digest: str
+    data_digest: str = field(metadata={"empty": True})
     versions: dict[str, str] = field(default_factory=dict)
     decision_points_s: tuple[float, ...] = ()
     """Windows for which the model can decide, the full one last; empty without
@@ -221,11 +226,11 @@ class ModelInfo:
     """The stopping rules of each task; empty without decision points."""
     novelty: Novelty | None = None
     """The limits of novelty; None without decision points."""
-    joints: int = 0
+    joints: int = limited(0, allowed=range(1001))
     """Number of joint angles in a frame, if a feature is made of them; else 0."""
     kernels: Mapping[str, KernelTable] = field(default_factory=dict)
     """{feature: its table} of the features that are made of kernels."""
-    name: str = ""
+    name: str = limited("", empty=True)
     """The model's name."""
     trials: tuple[str, ...] = ()
     """(rows,) names of the training trials; empty where they were too many to be
@@ -233,7 +238,7 @@ class ModelInfo:
     usual: Mapping[str, Sequence[float]] = field(default_factory=dict)
     """{feature: the least and the greatest mean over the full window of nearly all
     training trials}; empty without decision points."""
-    still_s: Sequence[float] = ()
+    still_s: tuple[float, ...] = ()
     """(dof,) seconds for which each joint stood still in nearly all training trials, at
     the longest."""
     repeats: bool = False
@@ -242,7 +247,9 @@ class ModelInfo:
     onset: str = ""
     """What tells the onsets other than the skin, see `edge.touch.frame.ONSETS`; empty where
     the skin does."""
-    speeds: Sequence[float] = ()
+    scorer: str = "knn"
+    """What gives the distances of labels, one of `edge.decide.engines.SCORERS`."""
+    speeds: tuple[float, ...] = limited((), count=2)
     """Least and greatest speed of the joints before onset, in radians a second, for
     which the training trials speak; empty where not known."""
 
@@ -300,12 +307,11 @@ class ModelInfo:
             scores, ("float64", ())
         )
         for task, entry in self.tasks.items():
-            outputs |= {
-                f"{task}_label": ("int64", ()),
-                f"{task}_scores": ("float64", (len(entry.labels),)),
-                f"{task}_distances": ("float64", (entry.k,)),
-                f"{task}_neighbours": ("int64", (entry.k,)),
-            }
+            outputs[f"{task}_label"] = "int64", ()
+            outputs[f"{task}_scores"] = "float64", (len(entry.labels),)
+            if entry.k:
+                outputs[f"{task}_distances"] = "float64", (entry.k,)
+                outputs[f"{task}_neighbours"] = "int64", (entry.k,)
             if self.has_label_distances:
                 outputs[f"{task}_label_distances"] = "float64", (len(entry.labels),)
         return outputs

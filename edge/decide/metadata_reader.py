@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from typing import Any
 
 from edge.config import ConfigTable, parse_json, short_text
 from edge.decide.agreement import factors_fit
@@ -52,9 +53,7 @@ def from_json(text: str, name: str) -> ModelInfo:
 def _read(meta: ConfigTable) -> ModelInfo:
     """Read the table of a model's metadata."""
     tasks = meta.table("tasks")
-    task_of = {str(task): _task(tasks.table(task)) for task in tasks.raw}
     tracking = meta.table("tracking")
-    points = meta.numbers("decision_points_s", default=())
     names = meta.texts("features")
     units = meta.table("units")
     layout = SkinLayout.from_dict(meta.get("skin"), where=meta.where)
@@ -65,45 +64,30 @@ def _read(meta: ConfigTable) -> ModelInfo:
         chain = Chain.from_dict(arm, where=f"{meta.where}: arm")
     stopping = {}
     novelty = None
-    if points:
+    count = len(meta.numbers("decision_points_s", default=()))
+    if count:
         rules = meta.table("stopping")
-        count = len(points)
-        for task in rules.raw:
-            stopping[task] = read_stopping(rules.table(task), count)
-        table = meta.table("novelty")
-        typical = table.numbers("typical", count, low=0.0)
-        novelty = Novelty(typical, table.numbers("limits", count, low=0.0))
+        stopping = {task: read_stopping(rules.table(task), count) for task in rules.raw}
+        novelty = Novelty(**meta.table("novelty").values(Novelty, count))
     kernels = {}
     if not KERNELS.keys().isdisjoint(names):
         kernels = read_tables(meta.table("kernels"), names, layout)
-    info = ModelInfo(
-        tasks=task_of,
-        layout=layout,
-        debounce=tracking.whole("debounce", allowed=range(1, 101)),
-        window_s=meta.number("window_s", low=0.0, high=3600.0, open_low=True),
-        samples=meta.whole("samples", allowed=range(2, 10_001)),
-        features=names,
-        units={name: units.text(name) for name in names},
-        motion_frame=meta.choice("motion_frame", ("world", "skin")),
-        chain=chain,
-        rows=meta.whole("rows"),
-        data_digest=meta.text("data_digest", empty=True),
-        versions={str(key): str(version) for key, version in versions.items()},
-        decision_points_s=points,
-        stopping=stopping,
-        novelty=novelty,
-        joints=meta.whole("joints", 0, allowed=range(0, 1001)),
-        kernels=kernels,
-        name=meta.text("name", "", empty=True),
-        trials=meta.texts("trials", ()),
-        usual=_usual(meta, names),
-        still_s=meta.numbers("still_s", default=()),
-        repeats=meta.flag("repeats", False),
-        onset=meta.choice("onset", ("", *ONSETS), ""),
-        speeds=meta.numbers("speeds", 2) if meta.has("speeds") else (),
-    )
+    others: dict[str, Any] = {
+        "tasks": {str(task): _task(tasks.table(task)) for task in tasks.raw},
+        "layout": layout,
+        "debounce": tracking.whole("debounce", allowed=range(1, 101)),
+        "units": {name: units.text(name) for name in names},
+        "motion_frame": meta.choice("motion_frame", ("world", "skin")),
+        "chain": chain,
+        "versions": {str(key): str(version) for key, version in versions.items()},
+        "stopping": stopping,
+        "novelty": novelty,
+        "kernels": kernels,
+        "usual": _usual(meta, names),
+        "onset": meta.choice("onset", ("", *ONSETS), ""),
+    }
     tracking.refuse_unknown()
-    return info
+    return ModelInfo(**meta.values(ModelInfo, **others))
 
 
 def _task(table: ConfigTable) -> Task:
@@ -112,18 +96,8 @@ def _task(table: ConfigTable) -> Task:
     if not bare or len(bare) < len(labels) or not "".join(labels).isprintable():
         raise table.fail("labels", "a list of different, printable texts")
     factors = table.table("factors")
-    task = Task(
-        labels,
-        k=table.whole("k", allowed=range(1, 1 << 31)),
-        components=table.whole("components", allowed=range(1 << 31)),
-        scaling=table.text("scaling"),
-        accuracy=table.number("accuracy", low=0.0, high=1.0),
-        projection=table.text("projection"),
-        features=table.texts("features"),
-        left_out=table.text("left_out"),
-        no_contact=table.text("no_contact") if table.has("no_contact") else None,
-        factors={factor: factors.wholes(factor) for factor in factors.raw},
-    )
+    by_factor = {factor: factors.wholes(factor) for factor in factors.raw}
+    task = Task(**table.values(Task, factors=by_factor))
     table.refuse_unknown()
     return task
 
@@ -135,30 +109,18 @@ def read_stopping(table: ConfigTable, points: int) -> Stopping:
         InputError: the table is damaged.
     """
     trials = table.whole("trials", allowed=range(1, 1 << 31))
-    remoteness = None
+    rules = []
+    for rule in table.tables("rules", f"{table.prefix}rules"):
+        last = rule.whole("last", allowed=range(points))
+        rules.append(StoppingRule(**rule.values(StoppingRule, last=last)))
+    others: dict[str, Any] = {
+        "rules": tuple(rules),
+        "wrong": table.whole("wrong", allowed=range(trials + 1)),
+        "remoteness": None,
+    }
     if table.has("remoteness"):
-        remoteness = read_remoteness(table.table("remoteness"), points)
-    return Stopping(
-        slopes=table.numbers("slopes", points, low=1e-12, high=1e12),
-        intercepts=table.numbers("intercepts", points),
-        doubts=table.numbers("doubts", points, low=0.0),
-        slope=table.number("slope", low=1e-12, high=1e12),
-        intercept=table.number("intercept"),
-        doubt=table.number("doubt", low=0.0),
-        rules=tuple(
-            StoppingRule(
-                error=rule.number("error", low=0.0, high=1.0, open_low=True),
-                mean_s=rule.number("mean_s"),
-                confidence=rule.number("confidence"),
-                last=rule.whole("last", allowed=range(points)),
-            )
-            for rule in table.tables("rules", f"{table.prefix}rules")
-        ),
-        trials=trials,
-        wrong=table.whole("wrong", allowed=range(trials + 1)),
-        risk=table.number("risk", low=0.0, high=1.0, open_low=True),
-        remoteness=remoteness,
-    )
+        others["remoteness"] = read_remoteness(table.table("remoteness"), points)
+    return Stopping(**table.values(Stopping, points, **others))
 
 
 def read_remoteness(table: ConfigTable, points: int) -> Remoteness:
@@ -167,13 +129,9 @@ def read_remoteness(table: ConfigTable, points: int) -> Remoteness:
     Raises:
         InputError: the table is damaged.
     """
-    worth = table.table("worth")
-    return Remoteness(
-        limits=table.numbers("limits", points, low=0.0),
-        middles=table.numbers("middles", points, low=1e-9),
-        slopes=table.numbers("slopes", points, low=0.0),
-        worth={name: worth.number(name, low=0.0, high=1.0) for name in worth.raw},
-    )
+    shares = table.table("worth")
+    worth = {name: shares.number(name, low=0.0, high=1.0) for name in shares.raw}
+    return Remoteness(**table.values(Remoteness, points, worth=worth))
 
 
 def _usual(meta: ConfigTable, names: Sequence[str]) -> dict[str, Sequence[float]]:

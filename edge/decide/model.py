@@ -18,6 +18,8 @@ from edge.errors import InputError, OutOfRange, printable
 from edge.files import read_bytes
 
 LARGEST_BYTES = 1 << 30
+NONE: Any = np.zeros(0)
+"""Of neighbours, where the model's scorer has none."""
 
 
 class Decision(NamedTuple):
@@ -39,7 +41,8 @@ class Decision(NamedTuple):
         scores: (labels,) share of the votes of each label.
         distances: (k,) of the neighbours, nearest first, in the space of the
             projection.
-        neighbours: (k,) rows of the training set, nearest first.
+        neighbours: (k,) rows of the training set, nearest first. Both are empty where
+            the model's scorer is another than k-NN.
         tie: another label had as many votes; the nearest of the tied won.
         label_distances: (labels,) how far the nearest training trials of each label lie
             (`train.model.pipeline.nearest_of_label` says how many), in log odds, of a
@@ -258,8 +261,8 @@ class Model:
             confidence=confidence,
             votes=shares[label],
             scores=scores,
-            distances=answers[f"{task}_distances"],
-            neighbours=answers[f"{task}_neighbours"],
+            distances=answers.get(f"{task}_distances", NONE),
+            neighbours=answers.get(f"{task}_neighbours", NONE),
             tie=shares.count(max(shares)) > 1,
             label_distances=distances,
             out_of_range=bool(answers["out_of_range"] > 0.0),

@@ -42,8 +42,8 @@ from edge.touch.contact import FeatureSeries
 from edge.touch.layout import SkinLayout
 from edge.touch.track import first_contact
 
-OUTPUTS = ("label", "neighbours", "scores", "distances")
-"""Ends of the names of a task's outputs."""
+OUTPUTS = ("label_distances", "label", "neighbours", "scores", "distances")
+"""Ends of the names of a task's outputs, of which a model may lack some."""
 OF_ALL_TASKS = ("novelty", "remoteness", "out_of_range")
 """Outputs that belong to no task."""
 
@@ -125,7 +125,7 @@ def _answered_key(key: str) -> str:
     ONNX leaves open where NaN stands in an order, so that what follows from a vector
     that is not finite may differ.
     """
-    for end in sorted((*OUTPUTS, "label_distances"), key=len, reverse=True):
+    for end in OUTPUTS:
         if key.endswith(f"_{end}"):
             return key.removesuffix(end) + "label"
     return key
@@ -213,9 +213,13 @@ def _named(
 ) -> dict[str, Array]:
     """Outputs as a golden file names them; the prefix tells its two kinds of vectors
     apart."""
-    ends = (*OUTPUTS, "label_distances") if model.info.has_label_distances else OUTPUTS
     tasks = model.info.tasks
-    named = {f"{t}_{prefix}{end}": outputs[f"{t}_{end}"] for t in tasks for end in ends}
+    named = {
+        f"{task}_{prefix}{end}": outputs[f"{task}_{end}"]
+        for task in tasks
+        for end in OUTPUTS
+        if f"{task}_{end}" in outputs
+    }
     # What follows from a vector that is not finite may differ.
     answered = np.min([outputs[f"{task}_label"] for task in tasks], axis=0) >= 0
     for end in OF_ALL_TASKS:

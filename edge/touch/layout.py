@@ -3,14 +3,14 @@ newtons."""
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
 from typing import Any, Self
 
 import numpy as np
 
 from edge.arrays import Booleans
-from edge.config import ConfigTable
+from edge.config import ConfigTable, limited
 from edge.elementary import cos, sin
 from edge.errors import InputError, about
 
@@ -22,6 +22,7 @@ LONGEST_M = 1000.0
 """Greatest length of a skin: far beyond any, so that no product of two overflows."""
 MOST_LINES = 1024
 """Most rows, and most columns."""
+LINES = {"allowed": range(1, MOST_LINES + 1)}
 
 
 @dataclass(frozen=True)
@@ -32,29 +33,29 @@ class SkinLayout:
     cylinder (`radius_m` given) rows go along z and columns around.
     """
 
-    rows: int
-    cols: int
+    rows: int = field(metadata=LINES)
+    cols: int = field(metadata=LINES)
     wraps: bool = False
     """The last column touches the first."""
     pitch_m: float | tuple[float, float] | None = None
     """Distance between taxel centres, or (along rows, along columns); None if
     unknown."""
-    radius_m: float | None = None
-    row0_z_m: float = 0.0
+    radius_m: float | None = limited(None, low=1e-9, high=LONGEST_M)
+    row0_z_m: float = limited(0.0, low=-LONGEST_M, high=LONGEST_M)
     """z of row 0 on a cylinder; z falls by the row pitch with each row (elbow to
     wrist)."""
     column_angles_deg: tuple[float, ...] | None = None
     """Angle of each column about z, from x, on a cylinder; None: even steps from 0."""
-    counts_per_newton: float | None = None
+    counts_per_newton: float | None = limited(None, low=1e-9, high=1e9)
     """None if unknown: forces are then in counts."""
-    threshold_counts: int = 0
+    threshold_counts: int = limited(0, allowed=range(65536))
     """A taxel with more counts is in contact (paper, section III-B)."""
-    onset_counts: int | None = None
+    onset_counts: int | None = limited(None, allowed=range(65536))
     """A contact begins when its region's peak exceeds this; None:
     `threshold_counts`."""
     dead: tuple[int, ...] = ()
     """Flat indices (row * cols + col) of taxels whose counts are left out."""
-    release_s: float = RELEASE_S
+    release_s: float = limited(RELEASE_S, low=1e-9, high=LONGEST_RELEASE_S)
     """A contact ends after this many seconds with no taxel above the threshold."""
     axes: int | None = None
     """3 on a skin whose taxels give shear too, or for a model that needs it."""
@@ -142,10 +143,10 @@ class SkinLayout:
     def to_dict(self) -> dict[str, Any]:
         """The layout as the `skin` object of a recording's or a model's metadata."""
         skin = {}
-        for field in fields(self):
-            value = getattr(self, field.name)
+        for entry in fields(self):
+            value = getattr(self, entry.name)
             if value not in (None, ()):
-                skin[field.name] = list(value) if isinstance(value, tuple) else value
+                skin[entry.name] = list(value) if isinstance(value, tuple) else value
         return skin
 
     @classmethod
@@ -156,33 +157,13 @@ class SkinLayout:
             InputError: a value is missing or impossible; `where` names the file.
         """
         table = ConfigTable(skin, where, "skin.")
-        lines = range(1, MOST_LINES + 1)
-        values: dict[str, Any] = {
-            "rows": table.whole("rows", allowed=lines),
-            "cols": table.whole("cols", allowed=lines),
-            "wraps": table.flag("wraps", False),
-            "row0_z_m": table.number("row0_z_m", 0.0, -LONGEST_M, LONGEST_M),
-            "dead": table.wholes("dead", ()),
-            "threshold_counts": table.whole("threshold_counts", 0, range(65536)),
-        }
-        if table.has("onset_counts"):
-            values["onset_counts"] = table.whole("onset_counts", allowed=range(65536))
-        highest = {
-            "radius_m": LONGEST_M,
-            "counts_per_newton": 1e9,
-            "release_s": LONGEST_RELEASE_S,
-        }
-        for name, high in highest.items():
-            if table.has(name):
-                values[name] = table.number(name, low=1e-9, high=high)
+        cols = table.whole("cols", allowed=LINES["allowed"])
+        others: dict[str, Any] = {}
         if table.has("pitch_m"):
-            values["pitch_m"] = _pitch(table)
-        if table.has("axes") and table.whole("axes", allowed=(1, 3)) == 3:
-            values["axes"] = 3
-        if table.has("column_angles_deg"):
-            values["column_angles_deg"] = table.numbers(
-                "column_angles_deg", values["cols"]
-            )
+            others["pitch_m"] = _pitch(table)
+        if table.has("axes"):
+            others["axes"] = 3 if table.whole("axes", allowed=(1, 3)) == 3 else None
+        values = table.values(cls, cols, **others)
         with about(where):
             layout = cls(**values)
         return layout

@@ -1,10 +1,13 @@
 """One way to say what is wrong with a value: the sentence names file, key, wish and
 value."""
 
+from dataclasses import dataclass, field
+
 import pytest
 
 from edge.config import (
     ConfigTable,
+    limited,
     parse_json,
     parse_toml,
     read_toml,
@@ -87,6 +90,24 @@ def test_what_is_right_is_taken_as_it_is():
     assert table.numbers("l") == (1.0, 2.5)
     assert table.whole("null", 3) == 3  # JSON's null is as good as none
     table.refuse_unknown()
+
+
+@dataclass
+class Example:
+    n: int = field(metadata={"allowed": range(9)})
+    x: float | None = limited(None, low=0.0)
+    xs: tuple[float, ...] = ()
+    is_on: bool = True
+
+
+def test_a_record_says_the_types_and_limits_of_its_keys():
+    table = ConfigTable({"n": 7, "xs": [1, 2]}, "f")
+    assert Example(**table.values(Example, 2)) == Example(7, None, (1.0, 2.0))
+    table.refuse_unknown()
+    for raw in ({}, {"n": 9}, {"n": 7, "x": -1}, {"n": 7, "xs": [1]}):
+        with pytest.raises(InputError):
+            ConfigTable(raw, "f").values(Example, 2)
+    assert ConfigTable({"n": 9}, "f").values(Example, n=0)["n"] == 0
 
 
 def test_a_table_in_a_list_is_called_by_its_number():

@@ -11,8 +11,7 @@ import numpy as np
 import pytest
 
 from edge import demo
-from edge.decide.answers import answers_about
-from edge.decide.classifier import ASKED_A_SECOND, FEWEST_ASKED, Classifier
+from edge.decide.classifier import FEWEST_ASKED, Classifier
 from edge.decide.events import Decided, Onset
 from edge.decide.model import Model
 from edge.record.recording import load
@@ -98,37 +97,6 @@ def test_no_frame_asks_more_than_a_few_questions_and_the_answers_are_the_same(
     assert sum(isinstance(event, Decided) for _, event in spread) == len(
         answers_of(at_once)
     )
-
-
-def test_the_contact_that_has_been_due_longest_is_asked_first(early, monkeypatch):
-    """One question in 0.2 s, for three contacts with points 0.4 s apart."""
-    asked = []
-
-    def answers(model, contact, number, point):
-        asked.append((number, point))
-        return answers_about(model, contact, number, point)
-
-    monkeypatch.setattr("edge.decide.classifier.answers_about", answers)
-    monkeypatch.setattr("edge.decide.classifier.FEWEST_ASKED", 1)
-    monkeypatch.setattr("edge.decide.classifier.ASKED_A_SECOND", 0)
-    classifier = Classifier(early, error=ERROR, max_contacts=3)
-    for policy in classifier._policies.values():
-        monkeypatch.setattr(policy, "answer", lambda *_: None)
-    for frame in islice(frames(early.info.dof or 0), 0, 190, 20):
-        classifier.push(frame)
-    assert asked[:6] == [(1, 0), (2, 0), (3, 0), (1, 1), (2, 1), (3, 1)]
-
-
-def test_a_slow_skin_asks_more_a_frame_so_that_no_answer_comes_late(early):
-    """At 20 Hz a frame has five times as long as at 100 Hz."""
-    events, _ = decided(early, ERROR, step=5)
-    late_s = [
-        t - event.onset_s - event.window_s
-        for t, event in events
-        if isinstance(event, Decided)
-    ]
-    assert late_s
-    assert max(late_s) <= len(PLACES) / ASKED_A_SECOND + 0.05
 
 
 def test_a_stream_that_ends_is_asked_about_all_that_is_due(early, monkeypatch):

@@ -1,5 +1,6 @@
 """Progress on stderr: a bar on a terminal, few lines in a log."""
 
+import logging
 import sys
 
 from train import progress
@@ -21,3 +22,18 @@ def test_long_work_is_a_line_each_time_in_a_log_and_a_bar_on_a_terminal(
         err = capsys.readouterr().err
         assert "working: 100%" in err
         assert ("\r" in err) is is_terminal
+
+
+def test_stages_share_a_bar_and_are_lines_of_the_log(capsys, monkeypatch, caplog):
+    monkeypatch.setattr(progress, "LOG_S", 0.0)
+    monkeypatch.setattr(progress, "FIRST_S", 0.0)
+    with (
+        caplog.at_level(logging.DEBUG),
+        progress.stages({"first": 3.0, "second": 1.0}, shown=True) as stage,
+    ):
+        for name in ("first", "second"):
+            with stage(name):
+                pass
+    shares = [line.split()[1] for line in capsys.readouterr().err.splitlines()]
+    assert [share for share in shares if share != "0%"][:2] == ["75%", "100%"]
+    assert [record.args[0] for record in caplog.records] == ["first", "second"]

@@ -85,8 +85,8 @@ def order(
     if len(repeated) > MOST_REPEATED * len(t):
         still = frames[repeated[0] + 1]
         raise InputError(
-            f"{where}: its time stands still at {frame} {numbers[still]}; name another "
-            "time, or fix the times"
+            f"{where}: its time stands still at {frame} {numbers[still]}; give --rate HZ, "
+            "such as --rate 100, or another time"
         )
     changes = _sparse(forward)
     swapped = int((steps < 0.0).sum())

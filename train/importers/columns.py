@@ -194,13 +194,14 @@ def _time_column(
         return column(table, "--time", options.time)
     if options.rate is not None:
         return None
-    times = named_times(table, joints)
-    if not times:
-        raise InputError(
-            f"{table.where}: no column is a time; give --rate HZ, such as --rate 100, or "
-            f"--time COL, among {short_text(table.names)}"
-        )
-    return times[0]
+    if times := named_times(table, joints):
+        return times[0]
+    numbers = table.data.select_dtypes("number")
+    rising = [name for name in numbers if (numbers[name].diff()[1:] > 0.0).all()]
+    raise InputError(
+        f"{table.where}: no column is called a time; give --rate HZ, such as --rate 100, "
+        f"or --time {' or '.join(rising) or 'COL'}, among {short_text(table.names)}"
+    )
 
 
 def named_times(table: Table, joints: Sequence[str] = ()) -> list[str]:
@@ -253,10 +254,14 @@ def _running(table: Table, rest: Sequence[str]) -> tuple[list[str], tuple[int, .
             f"{grids[0][0][0]}-{grids[0][0][-1]}, and joint angles by --joints"
         )
     three = ", or --axes xyz for taxels of three axes" * any(map(lettered, rest))
-    running = ",".join(filter(re.compile(RUNNING).match, rest))
+    numbers = table.data.select_dtypes("number").columns
+    names = [name for name in rest if name in numbers] or rest
+    if any(set(",;- ") & set(name) for name in names):
+        every = list(table.file_names) or table.names
+        names = [str(every.index(name) + 1) for name in names]
     raise InputError(
         f"{table.where}: no columns are named as taxels, such as s1 to s16 without a gap; "
-        f"give --taxels {running or 'COLS'}{three}, among {short_text(list(rest))}"
+        f"give --taxels {','.join(names)}{three}, without what is no taxel"
     )
 
 

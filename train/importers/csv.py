@@ -314,8 +314,11 @@ def _require_taxels(trials: Sequence[Samples], taxels: Sequence[str]) -> None:
     stays = np.all([(step == 0.0).all(axis=0) for step in steps], axis=0)
     starts = [trial.values[0, :, 0] for trial in trials]
     doubtful = rises | (stays & (np.ptp(starts, axis=0) > 0.0))
-    if doubtful.any() and not doubtful.all():
+    likely = [
+        taxel for taxel, is_odd in zip(taxels, doubtful, strict=True) if not is_odd
+    ]
+    if doubtful.any() and likely:
         raise InputError(
             f"{trials[0].where}: column {taxels[doubtful.argmax()]} counts up, or tells "
-            "the trials apart; name the taxels by --taxels"
+            f"the trials apart; name the taxels, such as --taxels {','.join(likely)}"
         )

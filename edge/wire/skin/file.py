@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from edge.arrays import Counts, Floats
-from edge.config import ConfigTable, parse_toml
+from edge.config import ConfigTable, limited, parse_toml
 from edge.errors import InputError
 from edge.files import read_text
 from edge.touch.layout import SkinLayout
@@ -32,12 +32,12 @@ class Signal:
         dead: broken taxels, (row, col).
     """
 
-    dead_band_sigma: float = 6.0
-    dead_band_counts: int = 0
-    drift_counts_per_s: float = 20.0
-    drift_limit_counts: int = 2000
-    settle_s: float = 0.5
-    saturation_counts: int = 65535
+    dead_band_sigma: float = limited(6.0, low=0.0, high=100.0)
+    dead_band_counts: int = limited(0, allowed=range(65536))
+    drift_counts_per_s: float = limited(20.0, low=0.0, high=65535.0)
+    drift_limit_counts: int = limited(2000, allowed=range(65536))
+    settle_s: float = limited(0.5, low=0.0, high=60.0)
+    saturation_counts: int = limited(65535, allowed=range(1, 65536))
     dead: tuple[tuple[int, int], ...] = ()
 
 
@@ -55,11 +55,11 @@ class Reading:
             few as its noise proves, is invalid, if it made noise during calibration.
     """
 
-    rate_hz: float = 100.0
-    timeout_s: float = 0.02
+    rate_hz: float = limited(100.0, low=0.1, high=10_000.0)
+    timeout_s: float = limited(0.02, low=0.001, high=10.0)
     verify_mux: bool = True
-    recheck_frames: int = 4
-    stuck_frames: int = 100
+    recheck_frames: int = limited(4, allowed=range(1, 100_001))
+    stuck_frames: int = limited(100, allowed=range(2, 1_000_001))
 
 
 @dataclass(frozen=True)
@@ -134,7 +134,9 @@ def parse(text: str, where: str = "skin") -> SkinFile:
     layout = SkinLayout.from_dict(skin.raw, where=where)
     signals = top.table("signal", {})
     sign = signals.whole("sign", allowed=(1, -1)) if signals.has("sign") else None
-    reading = _reading(top.table("read", {}))
+    table = top.table("read", {})
+    reading = Reading(**table.values(Reading))
+    table.refuse_unknown()
     buses = read_buses(top.tables("bus", "bus"), layout, sign)
     chips = [chip for bus in buses for chip in bus.chips]
     defaults = _defaults(chips)
@@ -160,36 +162,12 @@ def _signal(table: ConfigTable, layout: SkinLayout, defaults: Defaults) -> Signa
     dead = table.get("dead", [])
     if not isinstance(dead, list):
         raise table.fail("dead", "a list of [row, col]")
-    counts = range(65536)
-    signal = Signal(
-        dead_band_sigma=table.number("dead_band_sigma", 6.0, 0.0, 100.0),
-        dead_band_counts=table.whole(
-            "dead_band_counts", defaults.dead_band_counts, counts
-        ),
-        drift_counts_per_s=table.number(
-            "drift_counts_per_s", defaults.drift_counts_per_s, 0.0, 65535.0
-        ),
-        drift_limit_counts=table.whole(
-            "drift_limit_counts", defaults.drift_limit_counts, counts
-        ),
-        settle_s=table.number("settle_s", 0.5, 0.0, 60.0),
-        saturation_counts=table.whole("saturation_counts", 65535, counts[1:]),
-        dead=tuple(taxel_at(table, "dead", entry, layout) for entry in dead),
-    )
+    keys = Signal.__dataclass_fields__.keys() & asdict(defaults).keys()
+    table.raw = {**{key: getattr(defaults, key) for key in keys}, **table.raw}
+    places = tuple(taxel_at(table, "dead", entry, layout) for entry in dead)
+    signal = Signal(**table.values(Signal, dead=places))
     table.refuse_unknown()
     return signal
-
-
-def _reading(table: ConfigTable) -> Reading:
-    reading = Reading(
-        rate_hz=table.number("rate_hz", 100.0, 0.1, 10_000.0),
-        timeout_s=table.number("timeout_s", 0.02, 0.001, 10.0),
-        verify_mux=table.flag("verify_mux", True),
-        recheck_frames=table.whole("recheck_frames", 4, range(1, 100_001)),
-        stuck_frames=table.whole("stuck_frames", 100, range(2, 1_000_001)),
-    )
-    table.refuse_unknown()
-    return reading
 
 
 def _calibration(

@@ -42,37 +42,9 @@ def test_json_at_a_terminal_is_what_a_pipe_gets(terminal, capsys):
     assert all(round(e["onset_s"], 6) == e["onset_s"] for e in events[:-1])
 
 
-def test_a_recording_is_named_with_its_labels_before_what_was_decided(terminal, capsys):
-    assert main(["replay", "--model", str(demo.MODEL), TOUCH]) == 0
-    assert capsys.readouterr().out.splitlines()[0] == (
-        f"{TOUCH}, category: soft-movable, mobility: movable, object: pillow, "
-        "softness: soft"
-    )
-
-
 @pytest.mark.parametrize(
     ("line", "text"),
     [
-        ({"event": "onset", "onset_s": 1.5, "contact": 2}, "   1.500 s  contact 2"),
-        (
-            {"event": "release", "onset_s": 1.5, "release_s": 2.75},
-            "   2.750 s  released after 1.25 s",
-        ),
-        (
-            {"event": "bus", "t": 3.0, "bus": "/dev/i2c-1", "state": "lost"},
-            "   3.000 s  /dev/i2c-1 is lost; it is opened again until it answers",
-        ),
-        (
-            {
-                "event": "chip",
-                "t": 3.0,
-                "bus": "/dev/i2c-1",
-                "place": "address 0x2c",
-                "state": "down",
-                "error": "no power",
-            },
-            "   3.000 s  /dev/i2c-1, address 0x2c is down: no power",
-        ),
         (
             {
                 "event": "decision",
@@ -85,15 +57,6 @@ def test_a_recording_is_named_with_its_labels_before_what_was_decided(terminal, 
                 "expected": "foam",
             },
             "   1.400 s  object     box               60%  (tie; labelled foam)",
-        ),
-        ({"event": "no_contact"}, "no contact"),
-        (
-            {"event": "taxels", "t": 1.5, "invalid": 12, "frames": 50},
-            "   1.500 s  taxels without a valid value for 50 frames: 12",
-        ),
-        (
-            {"event": "taxels", "t": 1.5, "invalid": 0, "frames": 50},
-            "   1.500 s  all taxels are valid again",
         ),
         (
             {

@@ -49,7 +49,7 @@ def test_any_further_column_is_left_out_and_named(name):
     ("names", "sentence"),
     [
         (("thumb", "index"), "no columns are named as taxels"),
-        (("p1", "p2", "p4", "f"), "s1 to s16 without a gap; give --taxels p1,p2,p4, "),
+        (("p1", "p2", "p4", "f"), "--taxels p1,p2,p4,f"),
         (("p1", "p2", "f1", "f2"), 'are the taxels "p1" to "p2" or "f1" to "f2"'),
         (("taxel_1", "taxel_2", "tactile1", "tactile2"), 'are the taxels "taxel_1"'),
     ],

@@ -117,13 +117,6 @@ def test_check_says_where_the_wires_are_too_slow(edge, skin):
     assert "asks for 100 Hz, but the wires carry 47.5" in " ".join(event["remarks"])
 
 
-@pytest.mark.parametrize("name", ["mpr121", "matrix"])
-def test_a_skin_file_that_comes_with_the_program_works(edge, name):
-    status, (event,), _ = edge("check", skinfile.shipped(name))
-    assert status == 0
-    assert "not calibrated yet" in event["remarks"][-1]
-
-
 def test_a_person_is_told_each_thing_once(edge, tmp_path, monkeypatch):
     monkeypatch.setattr("sys.stdout.isatty", lambda: True)
     path = tmp_path / "skin.toml"

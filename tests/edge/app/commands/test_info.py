@@ -21,10 +21,6 @@ def test_a_program_gets_the_metadata_with_size_and_time(edge):
     assert labels == {name: task.labels for name, task in INFO.tasks.items()}
 
 
-def test_the_model_is_taken_by_place_or_by_its_option(edge):
-    assert edge("info", "--model", demo.MODEL) == edge("info", demo.MODEL)
-
-
 def test_the_doubt_about_names_says_what_it_is_worth():
     stopping = INFO.stopping["object"]
     worth = {"unknown": 0.46, "unsure": 0.21, "sure": 0.09, "known": 0.02}

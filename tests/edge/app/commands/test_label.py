@@ -40,15 +40,6 @@ def test_the_labels_of_a_folder_are_listed_and_its_files_left_alone(folder, a, e
     assert a.read_bytes() == before
 
 
-def test_a_label_that_would_act_on_a_terminal_is_counted_as_an_escape(a, edge):
-    touch = load(a)
-    save(a, replace(touch, meta={**touch.meta, "labels": {"object": "\x1b[2J"}}))
-    status, _, err = edge("label", a)
-    assert status == 0
-    assert err.endswith("object (1 of 1): _[2J 1\n")
-    assert "\x1b" not in err
-
-
 def test_a_file_is_relabelled_and_keeps_all_else(a, edge):
     before = load(a)
     new = ("--set", "object=brick", "--set", "softness=rigid", "--yes")
@@ -118,12 +109,6 @@ def test_touches_are_listed_by_what_asks_for_a_look(kept, edge, words, expected)
     options = [f"--only={word}" for word in words]
     _, lines, _ = edge("label", kept, *options)
     assert [Path(line["file"]).stem for line in lines] == expected
-
-
-def test_a_touch_is_listed_with_its_decisions_and_what_asks_for_a_look(kept, edge):
-    (line,) = edge("label", kept / "unsure.npz")[1]
-    assert line["decided"]["softness"]["label"] == "hard"
-    assert line["kinds"] == ["unsure", "unlabelled"]
 
 
 def test_a_decision_is_accepted_where_it_names_a_label_and_nobody_has(kept, edge):

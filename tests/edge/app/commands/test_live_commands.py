@@ -3,7 +3,6 @@
 import json
 import signal
 from dataclasses import replace
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -15,7 +14,6 @@ from edge.wire.fake.clock import VirtualClock
 from edge.wire.fake.player import calibrated, fake_buses
 from edge.wire.fake.touches import still
 from edge.wire.skin import file as skinfile
-from edge.wire.skin.loop import Stop
 from edge.wire.skin.skin import Skin
 from tests.conftest import decided, lines, python
 
@@ -66,11 +64,6 @@ def test_a_microcontroller_that_hangs_with_an_intact_frame_is_heard_of(
     assert chip["invalid"] == 100
     assert err.count("|" + "." * 10 + "|") == 10
     assert err.endswith("0 of 1 chips answer; taxels without a valid value: 100\n")
-    more = ("--label", "object=box", "--out", tmp_path / "trials")
-    status, events, err = edge("record", *fake, *more)
-    assert status == 1
-    assert [(e["event"], e["invalid"]) for e in events] == [("taxels", 100)]
-    assert "no contact was saved; taxels without a valid value: 100" in err
 
 
 def answered(event):
@@ -208,19 +201,3 @@ def test_a_signal_ends_a_command_at_once_until_the_skin_is_set_up(
     monkeypatch.setattr(source, "open_skin", opened)
     assert run("--fake", recordings / "soft_1.npz")[0] == 0
     assert handled == [signal.SIG_DFL]
-
-
-@pytest.mark.parametrize(
-    ("virtual", "stopped", "waits"),
-    [
-        (False, False, False),
-        (False, True, False),
-        (True, False, True),
-        (True, True, False),
-    ],
-)
-def test_a_slow_reader_never_delays_a_decision_in_real_time(virtual, stopped, waits):
-    """In virtual time the loop may wait, until it has been asked to stop."""
-    opened = SimpleNamespace(virtual=virtual)
-    live = source.Reading(opened, None, Stop(stopped), None, None)
-    assert live.may_wait() is waits

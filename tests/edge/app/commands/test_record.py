@@ -2,9 +2,7 @@
 known."""
 
 import io
-import os
 import signal
-import time
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import closing, contextmanager
 from dataclasses import replace
@@ -25,7 +23,7 @@ from edge.record.saving import save
 from edge.touch.frame import Frame
 from edge.wire.fake import player
 from edge.wire.fake.clock import VirtualClock
-from tests.conftest import ROOT, full_pipe, in_a_row, started
+from tests.conftest import ROOT, in_a_row
 
 
 def test_a_label_becomes_a_name_that_every_folder_takes_and_no_listing_hides(tmp_path):
@@ -116,14 +114,6 @@ def test_record_saves_a_trial_with_its_lead_in(record, recordings):
     assert trial.valid is None
 
 
-def test_record_keeps_the_names_of_a_recordings_joints(record, brief):
-    source = load(brief)
-    names = list("abcde")
-    save(brief, replace(source, meta={**source.meta, "joint_names": names}))
-    _, (event,), _ = record(fake=brief)
-    assert load(event["file"]).joint_names == tuple("abcde")
-
-
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
 def test_record_saves_the_trial_that_has_begun_when_it_is_told_to_end(
     record,
@@ -179,21 +169,6 @@ def test_record_without_any_of_the_joint_angles_that_it_was_to_have_fails(
     assert not event["joints"]
     assert "--joints gave no angles at the times of the frames" in err
     assert len(clocks) == 1  # it plays in real time, as angles come in real time
-
-
-def test_record_is_not_held_up_by_a_stdout_that_nobody_reads(brief, trials):
-    reading, writing = full_pipe()
-    options = ("--fake", brief, "--loop", "--label", "object=a", "--out", trials)
-    process = started("record", *options, stdout=writing)
-    while len(list(trials.glob("a-*.npz"))) < 3:
-        assert process.poll() is None
-        time.sleep(0.02)
-    process.send_signal(signal.SIGTERM)
-    _, err = process.communicate(timeout=30)
-    os.close(reading)
-    os.close(writing)
-    assert process.returncode == 0
-    assert "lines could not be sent to stdout: nobody reads them" in err
 
 
 def test_record_saves_one_trial_a_contact_and_never_overwrites(record, brief, trials):

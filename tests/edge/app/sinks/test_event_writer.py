@@ -35,15 +35,6 @@ def test_each_line_that_nobody_reads_is_counted_once_and_costs_no_time(monkeypat
         lines._thread.join()
 
 
-def test_a_line_that_comes_after_the_end_is_lost_and_counted():
-    out = io.StringIO()
-    lines = Lines(out)
-    lines.close()
-    lines.write([{}])
-    assert out.getvalue() == ""
-    assert lines.lost == 1
-
-
 def test_a_full_disk_costs_lines_and_not_decisions(capsys):
     """/dev/full answers each write as a full disk does."""
     with open("/dev/full", "w") as full, closing(Lines(full)) as lines:

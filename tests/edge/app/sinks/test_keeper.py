@@ -117,12 +117,6 @@ def test_labelled_touches_are_never_removed_and_a_full_folder_is_said(
     assert list(tmp_path.glob("kept-*.npz")) == [labelled]
 
 
-def test_two_runs_in_one_second_keep_two_touches(edge, tmp_path):
-    for _ in range(2):
-        assert run(edge, tmp_path, "--keep-if", "all")[0] == 0
-    assert len(list(tmp_path.glob("kept-*.npz"))) == 2
-
-
 def test_what_cannot_be_removed_ends_neither_the_run_nor_the_keeping(
     edge, tmp_path, little
 ):

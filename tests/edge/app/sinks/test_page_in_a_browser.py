@@ -1,6 +1,5 @@
 """What a person sees and does on the live page, in Chromium."""
 
-import re
 from contextlib import ExitStack
 
 import pytest
@@ -90,39 +89,6 @@ def test_a_label_applies_when_it_is_chosen_and_every_browser_shows_it(page, view
     assert page.labels == {"object": "box"}
 
 
-def test_a_label_for_an_old_touch_leaves_those_of_the_next(serve, tmp_path, view):
-    edge.save(tmp_path / "a.npz", TOUCH)
-    page = serve(labels={"object": "foam"})
-    shown = view(page, 1200)
-    shown.has(f"{ROWS}.length === 1")
-    shown.press("Relabel")
-    shown.write(".editor [aria-label='new label for object']", "sponge")
-    shown.press("Save")
-    labels = {**TOUCH.labels, "object": "sponge"}
-    shown.until(lambda: edge.load(tmp_path / "a.npz").labels == labels)
-    shown.has("document.querySelector('.editor') === null")
-    assert page.labels == {"object": "foam"}
-    sentence = shown.js("document.getElementById('recording').textContent")
-    assert sentence == "Each touch is saved as object=foam."
-    shown.js("scrollTo(0, 10000)")
-    top = shown.js("document.getElementById('recording').getBoundingClientRect().y")
-    assert 0 <= top < 20
-
-
-def test_several_touches_get_a_label_that_the_model_does_not_know(
-    kept_page, add_touch, view
-):
-    add_touch()
-    shown = view(kept_page, 1200)
-    shown.has(f"{ROWS}.length === 2")
-    shown.js("document.getElementById('all').click()")
-    shown.press("Label")
-    shown.write(".editor [aria-label='new label for softness']", "squashy")
-    shown.press("Save")
-    squashy = f"[...{ROWS}].every(row => row.textContent.includes('=squashy'))"
-    shown.has(squashy)
-
-
 def test_new_touches_move_neither_rows_nor_focus(kept_page, add_touch, view):
     shown = view(kept_page, 1200)
     shown.has(f"{ROWS}.length === 1")
@@ -190,38 +156,6 @@ def test_a_kept_touch_is_filtered_corrected_and_undone(kept_page, touch_folder, 
     shown.has(f"{ROWS}.length === 1")
     shown.press("Undo: relabel kept-1.npz softness=soft")
     shown.until(lambda: labels() == {})
-
-
-def test_of_two_people_the_second_learns_what_the_first_has_written(
-    kept_page, touch_folder, view
-):
-    first = view(kept_page)
-    second = view(kept_page)
-    for shown in (first, second):
-        shown.has(f"{ROWS}.length === 1")
-        shown.press("Correct")
-    for shown, name in ((first, "soft"), (second, "hard")):
-        shown.write(".editor [aria-label='new label for softness']", name)
-        shown.press("Save")
-        first.until(lambda: edge.load(touch_folder / "kept-1.npz").labels)
-    second.has("!document.getElementById('error').hidden")
-    assert "softness soft" in re.sub(r"\W+", " ", second.js("$('error').textContent"))
-    second.has(f"{ROWS}[0].textContent.includes('softness=soft')")
-    assert edge.load(touch_folder / "kept-1.npz").labels == {"softness": "soft"}
-
-
-def test_a_message_goes_by_a_press_or_after_a_while(page, view):
-    page.notice("chip 1 failed")
-    shown = view(page)
-    notices = "document.querySelectorAll('#notices li').length"
-    shown.has(f"{notices} === 1")
-    shown.js("document.querySelector('#notices button').click()")
-    assert shown.js(notices) == 0
-    shown.js("(window.setTimeout = queueMicrotask)")
-    page.notice("chip 1 failed")
-    page.notice("chip 2 failed")
-    shown.until(lambda: len(shown.js("notices")) == 3)
-    assert shown.js(notices) == 0
 
 
 def test_on_a_phone_labels_are_in_reach_and_names_break_between_words(

@@ -299,12 +299,3 @@ def test_the_thread_rests_nine_times_as_long_as_it_worked(monkeypatch):
         for _ in range(3):
             selector.select(0.0)
     assert rests == pytest.approx([0.0, 0.018, web.LONGEST_REST_S])
-
-
-def test_a_lack_of_descriptors_is_told_at_the_start():
-    with socket.socket() as free:
-        listener = free.fileno()
-    sentence = "cannot be listened at: Too many open"
-    # One is left, for the listener.
-    with descriptors(listener + 1), pytest.raises(InputError, match=sentence):
-        WebServer("127.0.0.1:0", print)

@@ -65,19 +65,6 @@ def test_a_mux_beside_that_does_not_answer_is_passed_over(bus):
     assert bus.met == 1
 
 
-def test_a_channel_that_another_program_opens_beside_is_noticed_and_closed(bus):
-    """Chips behind both muxes then answer at one address."""
-    first, _ = beside(bus)
-    first.select(3)
-    assert first.kept()
-    bus.transfer(bus.prepare(write(0x71, b"\x08")))
-    assert not first.kept()
-    first.forget()
-    first.select(3)
-    assert bus.chips[0x71].connected == []
-    assert first.kept()
-
-
 def test_every_mux_that_another_program_opened_is_closed():
     addresses = (0x70, 0x71, 0x72)
     bus = FaultyBus(chips={address: FakeTCA9548A() for address in addresses})
@@ -91,17 +78,6 @@ def test_every_mux_that_another_program_opened_is_closed():
     muxes[0].forget()
     muxes[0].select(3)
     assert [mux.connected for mux in bus.chips.values()] == [[3], [], []]
-
-
-@pytest.mark.parametrize(("verify", "bits"), [(True, 40), (False, 20)])
-def test_a_selection_takes_20_bits_reading_it_back_20_more_and_the_same_again_none(
-    verify, bits
-):
-    bus, mux = muxed(verify=verify)
-    for spent in (bits, 0):
-        before = bus.bits
-        mux.select(6)
-        assert bus.bits - before == spent
 
 
 def test_after_an_error_the_channel_is_selected_again():

@@ -7,7 +7,6 @@ import pytest
 
 from edge.wire.bus.protocol import (
     BusError,
-    BusGone,
     BusRefused,
     fetch,
     read,
@@ -97,19 +96,3 @@ def test_faults_hit_the_transactions_that_they_name_and_a_hung_one_costs_the_tim
     assert fake.transactions == 6
     assert fake.met == 3
     assert fake.now() == pytest.approx(0.03, rel=1e-3)
-
-
-def test_an_unplugged_adapter_is_gone_until_it_is_back_and_opened_again():
-    fake = bus(faults=[Fault(code=errno.ENODEV, during=(1.0, 2.0))])
-    send(fake, 0x10, [0])
-    fake.sleep(1.5)
-    with pytest.raises(BusGone):
-        send(fake, 0x10, [0])
-    with pytest.raises(BusGone):
-        fake.reopen()
-    fake.close()
-    fake.sleep(1.0)
-    with pytest.raises(BusGone):
-        send(fake, 0x10, [0])
-    fake.reopen()
-    send(fake, 0x10, [0])

@@ -33,23 +33,6 @@ def test_the_force_of_a_contact_is_kept_whatever_the_pitch(pitch):
         assert touches.STRENGTH[0] - 0.05 < strength < touches.STRENGTH[1] + 0.05
 
 
-def test_a_contact_is_as_large_in_metres_on_a_finer_skin():
-    """The spread of its forces along the rows, in metres."""
-
-    def spread(recording, pitch):
-        rows = recording.frames.sum(axis=(0, 2)).astype(float)
-        at = np.arange(len(rows)) * pitch
-        return np.sqrt(
-            np.average((at - np.average(at, weights=rows)) ** 2, weights=rows)
-        )
-
-    coarse, fine = (
-        spread(on_ring(pitch)["cardboard-box-fixed-000"], pitch)
-        for pitch in (0.01, 0.005)
-    )
-    assert fine == pytest.approx(coarse, rel=0.1)
-
-
 def test_every_contact_lasts_for_a_window_on_a_skin_whose_scale_is_unknown():
     file = skinfile.load(skinfile.shipped("mpr121"))
     for name, recording in touches.touches(file, trials=3):
