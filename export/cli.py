@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import logging
 import os
 import sys
 from collections.abc import Sequence
@@ -109,6 +110,10 @@ def run(arguments: argparse.Namespace) -> int:
         check_writable(arguments.c)
         _write_skin(arguments)
         return 0
+    if arguments.verbose:
+        for handler in logging.getLogger("train").handlers:
+            handler.setLevel(logging.DEBUG)
+        logging.getLogger("train").setLevel(logging.DEBUG)
     # What may fail does so before the work, which may take an hour.
     for folder in filter(None, (arguments.out, arguments.c)):
         check_writable(folder)
@@ -121,7 +126,7 @@ def run(arguments: argparse.Namespace) -> int:
             suited(former, recording, str(file))
     with single_thread(), on_cluster(arguments.cluster):
         fitted = _fit(arguments)
-        from export.api import measure, save  # loads ONNX
+        from export.api import measure, save  # loads skl2onnx, which takes two seconds
 
         path = arguments.out / "model.onnx"
         size = save(path, fitted, arguments.name, partial(_write_c, arguments))

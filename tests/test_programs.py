@@ -1,6 +1,9 @@
 """Measuring programs refuse options that would measure nothing, before they begin; and
 a table names the command that made it."""
 
+import signal
+import subprocess
+import sys
 from types import SimpleNamespace
 
 import pytest
@@ -13,21 +16,20 @@ from tests.checks.bench.program import start
 from tests.checks.bench.scale import rows_of
 from tests.checks.hard_cases import __main__ as hard_cases
 from tests.checks.hard_cases import elsewhere
-from tests.checks.other_skins import SKINS, touch
+from tests.conftest import ROOT
 
 
 @pytest.mark.parametrize(
-    ("main", "words", "sentence"),
+    ("measure", "words", "sentence"),
     [
-        (hard_cases.main, ["--only", "tyes"], "no case's name holds 'tyes'"),
-        (elsewhere.main, ["--golden", "none", "python"], "no golden files are in none"),
+        (hard_cases.measure, ["tyes"], "no case's name holds 'tyes'"),
+        (elsewhere.measure, ["none", "python"], "no golden files are in none"),
+        (mutants.measure, [1, 1, "train"], "the rooms are skin, bus, "),
     ],
 )
-def test_options_that_would_measure_nothing_are_refused(main, words, sentence, capsys):
-    with pytest.raises(SystemExit) as ended:
-        main(words)
-    assert ended.value.code == 2
-    assert sentence in capsys.readouterr().err
+def test_options_that_would_measure_nothing_are_refused(measure, words, sentence):
+    with pytest.raises(EdgeError, match=sentence):
+        measure(*words)
 
 
 def test_a_number_of_nothing_is_refused(monkeypatch, capsys):
@@ -65,11 +67,6 @@ def test_a_word_is_exchanged_where_it_is_code(monkeypatch, tmp_path):
     ]
 
 
-def test_a_room_that_is_not_there_is_refused():
-    with pytest.raises(EdgeError, match="the rooms are skin, bus, "):
-        mutants.measure(1, 1, "train")
-
-
 def test_a_table_has_its_command_as_it_can_be_run_and_no_empty_part(
     monkeypatch, tmp_path
 ):
@@ -84,14 +81,23 @@ def test_a_table_has_its_command_as_it_can_be_run_and_no_empty_part(
     assert lines == ["", "| a | b |", "| --- | --- |", "| 1 | x |", "| 2 | y |"]
 
 
-def test_other_skins_have_their_traits():
-    hand, glove, force_glove, *_ = SKINS.values()
-    grip = touch(hand, 3, 1)
-    assert grip.shear.shape == (50, 3, 4, 2)
-    assert grip.joints.shape == (50, 7)
-    assert touch(glove, 3, 1).frames[0].max() > 60
-    loads = touch(force_glove, 3, 0).frames[60:].sum(axis=(1, 2))
-    assert loads.max() > 10 * loads.min()
+STEP = """
+from tests.checks import __main__ as checks
+words = ("import time; print(1, flush=True); time.sleep(600)",)
+checks.CHECKS = {"x": checks.Program((checks.PYTHON, "-c", *words), "")}
+checks.main(["x"])
+"""
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="needs Linux")
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT, signal.SIGKILL])
+def test_no_step_outlives_its_check(number):
+    pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.DEVNULL, "cwd": ROOT}
+    with subprocess.Popen([sys.executable, "-c", STEP], **pipes) as program:
+        assert program.stdout.readline() == b"1\n"
+        program.send_signal(number)
+        # All that could write have ended.
+        assert program.communicate(timeout=60) == (b"", None)
 
 
 def test_options_of_a_check_reach_its_last_step_and_a_failed_step_ends_it(monkeypatch):

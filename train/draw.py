@@ -21,10 +21,9 @@ from edge.features.vector import WINDOW_S
 from edge.record.recording import Recording
 from edge.touch.contact import FeatureSeries
 from edge.touch.layout import SkinLayout
-from edge.touch.track import ContactTracker
+from edge.touch.track import ContactTracker, first_contact
 from edge.writing import write_whole
 from train.data.arms import arm_of
-from train.data.contacts import contacts
 
 MOST = 6
 """More columns would not be readable at the width of a page."""
@@ -81,7 +80,11 @@ def _draw(
     touches = [_Column.of(*recording, horizon) for recording in recordings]
     layout = touches[0].recording.layout
     for touch in touches:
-        _require_units(touch, layout)
+        if units(touch.recording.layout) != units(layout):
+            raise InputError(
+                f"{touch.name}: has other units than the first recording; draw "
+                "recordings of one skin"
+            )
     figure = Figure(figsize=(2.6 * len(touches) + 0.6, 8.6), layout="constrained")
     axes = figure.subplots(
         4,
@@ -114,24 +117,6 @@ def units(layout: SkinLayout) -> tuple[str, str, str]:
     return UNITS[layout.force_unit], UNITS["taxel"], UNITS[layout.length_unit]
 
 
-def contact_of(
-    name: str,
-    recording: Recording,
-) -> tuple[float, FeatureSeries]:
-    """Onset and series of a recording's first contact.
-
-    Raises:
-        InputError: there is no such contact; the message begins with `name`.
-    """
-    chain = arm_of(recording, name)
-    if chain is not None:
-        recording = recording.for_joints(chain.names, name)
-    touches = contacts(recording, ContactTracker(recording.layout, chain=chain))
-    if not touches:
-        raise InputError(f"{name}: holds no contact")
-    return touches[0]
-
-
 @dataclass(frozen=True)
 class _Column:
     """A recording, and its first contact.
@@ -159,7 +144,14 @@ class _Column:
         Raises:
             InputError: there is no contact.
         """
-        onset, series = contact_of(name, recording)
+        chain = arm_of(recording, name)
+        if chain is not None:
+            recording = recording.for_joints(chain.names, name)
+        tracker = ContactTracker(recording.layout, chain=chain)
+        contact = first_contact(recording, tracker)
+        if contact is None:
+            raise InputError(f"{name}: holds no contact")
+        onset, series = contact
         t = recording.t - onset
         (inside,) = np.nonzero((t >= 0.0) & (t <= window_s))
         total = recording.frames[inside].sum(axis=(1, 2), dtype=np.int64)
@@ -173,21 +165,6 @@ class _Column:
         kind = self.recording.labels.get("category", "").replace("-", ", ")
         words = (kind, self.recording.labels.get("object"))
         return "\n".join(filter(None, words)) or "touch"
-
-
-def _require_units(touch: _Column, layout: SkinLayout) -> None:
-    """Refuse a touch in other units than those of a skin.
-
-    Raises:
-        InputError: the sentence names the touch.
-    """
-    theirs = ", ".join(units(touch.recording.layout))
-    ours = ", ".join(units(layout))
-    if theirs != ours:
-        raise InputError(
-            f"{touch.name}: its features are in {theirs}, those of the first recording "
-            f"in {ours}; draw recordings of one skin"
-        )
 
 
 def _decided(touch: _Column, model: Model) -> Decided | None:

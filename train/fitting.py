@@ -7,6 +7,7 @@ from typing import Any
 
 from edge.errors import InputError
 from edge.features.vector import WINDOW_S
+from edge.record.saving import listed
 from edge.record.slips import slips, too_few
 from train.choose.decision_points import decision_points, has_early_points
 from train.choose.options import FitOptions, described
@@ -21,9 +22,10 @@ from train.data.tasks import labels_of_tasks, lacking
 from train.data.vectors import Labels, Vectors
 from train.fitted import Fitted
 from train.model.pipeline import ContactClassifier
-from train.model.prototypes import counts_tried
+from train.model.prototypes import counts_tried, divided
 from train.model.stopping import SequentialClassifier
 from train.notes import warnings
+from train.progress import Stage, stages
 from train.tune import Loaded, choosing_of, trials_of, window, windows_of
 
 FEWEST_TRIALS = 3
@@ -57,7 +59,32 @@ def fit(data: DataSet | str | Path | Sequence[str | Path], **options: Any) -> Fi
         True
     """
     fixed = FitOptions(**options)
-    loaded = load(data, fixed)
+    with stages(_seconds(data), fixed.progress) as stage:
+        return _fitted(data, fixed, stage)
+
+
+fit.__doc__ = f"{fit.__doc__}\nOptions:\n{described()}\n"
+
+
+def _seconds(data: DataSet | str | Path | Sequence[str | Path]) -> dict[str, float]:
+    """{stage of a fit: about how many seconds it takes of one processor}."""
+    if isinstance(data, DataSet):
+        count = len(data.trials)
+    else:
+        count = len(listed(map(str, [data] if isinstance(data, str | Path) else data)))
+    return {
+        "following": 2.0 + 0.05 * count,
+        "choosing": 20.0 + 0.06 * min(count, MOST_CHOSEN),
+        "calibrating": 10.0 + 0.05 * count,
+    }
+
+
+def _fitted(
+    data: DataSet | str | Path | Sequence[str | Path], fixed: FitOptions, stage: Stage
+) -> Fitted:
+    """`fit`, stage by stage."""
+    with stage("following"):
+        loaded = load(data, fixed)
     y = labels_of_tasks(loaded.dataset, fixed.tasks)
     labels = [trial.labels for trial in loaded.dataset.trials]
     places = [str(trial.path) for trial in loaded.dataset.trials]
@@ -69,8 +96,9 @@ def fit(data: DataSet | str | Path | Sequence[str | Path], **options: Any) -> Fi
     few = {task: of_task[taught] for task, of_task in y.items()}
     untouched = loaded.dataset.untouched[:: len(labels) // len(taught)]
     sample = replace(loaded.dataset.part(taught), untouched=untouched)
-    settings, of_window = choose(replace(loaded, dataset=sample), few, fixed)
-    settings = in_prototypes(settings, sample, y, fixed)
+    with stage("choosing"):
+        settings, of_window = choose(replace(loaded, dataset=sample), few, fixed)
+        settings = in_prototypes(settings, sample, y, fixed)
     settings = settings.with_others(taught, y)
     measured = loaded.dataset.with_kernels(settings.window_s)
     points, of_points = decision_points(measured, settings, fixed)
@@ -79,11 +107,12 @@ def fit(data: DataSet | str | Path | Sequence[str | Path], **options: Any) -> Fi
     dataset = measured.of(sorted(settings.features()))
     vectors = dataset.vectors(settings.window_s, fixed.samples, y)
     sequential = None
-    if points:
-        sequential = calibrate(measured, y, points, settings, fixed)
-        classifier = sequential.decision_points_[-1]
-    else:
-        classifier = ContactClassifier.of(settings.choices, vectors)
+    with stage("calibrating"):
+        if points:
+            sequential = calibrate(measured, y, points, settings, fixed)
+            classifier = sequential.decision_points_[-1]
+        else:
+            classifier = uncalibrated(vectors, settings)
     fitted = Fitted(
         dataset=dataset,
         measured=replace(sample, kernels=measured.kernels),
@@ -107,9 +136,6 @@ def fit(data: DataSet | str | Path | Sequence[str | Path], **options: Any) -> Fi
         *warnings(fitted),
     )
     return replace(fitted, notes=notes)
-
-
-fit.__doc__ = f"{fit.__doc__}\nOptions:\n{described()}\n"
 
 
 def load(
@@ -203,6 +229,16 @@ def calibrate(
     )
     grouped = [t for t, chosen in settings.chosen.items() if chosen.held_out != TRIAL]
     return classifier.fit(at_points, y, settings.folds, settings.without, grouped)
+
+
+def uncalibrated(vectors: Vectors, settings: Settings) -> ContactClassifier:
+    """A classifier for the full window alone."""
+    if settings.prototypes:
+        at_end = replace(vectors, X=vectors.X[None])
+        choices = [settings.choices]
+        of_trials = divided(at_end, slice(None), choices, settings.prototypes, [{}])
+        vectors = replace(vectors, prototypes=of_trials)
+    return ContactClassifier.of(settings.choices, vectors)
 
 
 def _of_unseen(settings: Settings, options: FitOptions) -> list[str]:

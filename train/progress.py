@@ -1,13 +1,17 @@
 """Progress on stderr."""
 
+import logging
 import sys
-from collections.abc import Iterable
+import time
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import AbstractContextManager, contextmanager
 from typing import Any
 
 from tqdm import tqdm
 
 from edge.errors import printable
 
+LOG = logging.getLogger(__name__)
 LOG_S = 10.0
 """Between two lines of progress in a log."""
 FIRST_S = 2.0
@@ -27,6 +31,33 @@ def bar(iterable: Iterable[Any] | None = None, **options: Any) -> Any:
     progress = tqdm(iterable, file=LogLines(), **often, **options)
     progress.last_print_t -= LOG_S - FIRST_S
     return progress
+
+
+Stage = Callable[[str], AbstractContextManager[None]]
+"""Gives the context of a stage by its name."""
+
+
+@contextmanager
+def stages(seconds: Mapping[str, float], shown: bool) -> Iterator[Stage]:
+    """A bar over the stages of a program, with the time that is left of all; the log says
+    how long each took.
+
+    Args:
+        seconds: {stage: about how long it takes}.
+        shown: show the bar.
+    """
+    form = "{desc}: {percentage:3.0f}% [{elapsed}<{remaining}]"
+    total = sum(seconds.values())
+    with bar(total=total, desc="export", disable=not shown, bar_format=form) as left:
+
+        @contextmanager
+        def stage(name: str) -> Iterator[None]:
+            begun = time.monotonic()
+            yield
+            LOG.debug("%s: %.1f s", name, time.monotonic() - begun)
+            left.update(seconds[name])
+
+        yield stage
 
 
 class LogLines:

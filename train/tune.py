@@ -168,6 +168,7 @@ def trials_of(
             partial=True,
             progress=options.progress,
             jobs=options.processes,
+            cached=True,
         )
 
     def accuracy(levels: Levels) -> float:

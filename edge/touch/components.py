@@ -8,45 +8,22 @@ connectivity algorithm, 1982). The rounds are few, and each is linear in the run
 """
 
 from collections.abc import Iterator
-from dataclasses import dataclass
-from functools import cached_property
+from itertools import pairwise
 
 import numpy as np
 
-from edge.arrays import Array, Booleans, Indices, Integers
-from edge.touch.grid import Grid
+from edge.arrays import Array, Booleans, Indices
 
 
-@dataclass(frozen=True)
-class Components:
-    """Runs of active taxels, and the component of each.
-
-    Attributes:
-        starts: (runs,) flat index of the first taxel of each run.
-        lengths: (runs,) taxels of each run.
-        labels: (runs,) component of each run, from 0 in the order of first taxels.
-    """
-
-    starts: Indices
-    lengths: Indices
-    labels: Indices
-
-    @cached_property
-    def of_taxel(self) -> Indices:
-        """(taxels,) component of each active taxel, by rising index."""
-        return self.labels.repeat(self.lengths)
-
-    @cached_property
-    def areas(self) -> Indices:
-        """(components,) taxels of each."""
-        return np.bincount(self.of_taxel)
-
-
-def components_of(active: Booleans, wraps: bool) -> Components:
-    """The components of active taxels.
+def components_of(
+    active: Booleans, counts: Array, wraps: bool
+) -> Iterator[tuple[Indices, int]]:
+    """Taxels, as flat indices of `active`, and largest count of each component, in the
+    order of first taxels.
 
     Args:
         active: (rows, cols + 1), False in the last column, which separates the rows.
+        counts: (rows, cols) of the frame.
         wraps: the first column touches the last but one.
     """
     stride = active.shape[1]
@@ -70,7 +47,14 @@ def components_of(active: Booleans, wraps: bool) -> Components:
     roots = _roots(len(starts), lower, upper)
     is_root = roots == np.arange(len(roots))
     labels = (is_root.cumsum() - 1)[roots]
-    return Components(starts, ends - starts, labels)
+    of_taxel = labels.repeat(ends - starts)
+    areas = np.bincount(of_taxel)
+    peaks = np.full(len(areas), counts.min(), dtype=np.int64)
+    np.maximum.at(peaks, of_taxel, counts[active[:, :-1]])
+    taxels = np.flatnonzero(active)[of_taxel.argsort(kind="stable")]
+    places = pairwise([0, *areas.cumsum().tolist()])
+    components = [taxels[start:end] for start, end in places]
+    return zip(components, peaks.tolist(), strict=True)
 
 
 def _roots(count: int, first: Indices, second: Indices) -> Indices:
@@ -96,62 +80,3 @@ def _roots(count: int, first: Indices, second: Indices) -> Indices:
         first = first[differ]
         second = second[differ]
     return parents
-
-
-def _peaks(
-    components: Components,
-    active: Booleans,
-    counts: Array,
-) -> Integers:
-    """(components,) the largest count of each."""
-    peaks = np.full(len(components.areas), counts.min(), dtype=np.int64)
-    np.maximum.at(peaks, components.of_taxel, counts[active[:, :-1]])
-    return peaks
-
-
-def all_of(
-    active: Booleans,
-    counts: Array,
-    wraps: bool,
-) -> Iterator[tuple[Indices, int]]:
-    """Taxels, as flat indices of `active`, and peak of each component.
-
-    Args:
-        active: as for `components_of`.
-        counts: (rows, cols) of the frame.
-        wraps: as for `components_of`.
-    """
-    components = components_of(active, wraps)
-    order = components.of_taxel.argsort(kind="stable")
-    taxels = np.flatnonzero(active)[order]
-    parts = np.split(taxels, components.areas.cumsum()[:-1])
-    peaks = _peaks(components, active, counts).tolist()
-    return zip(parts, peaks, strict=False)  # without a component there is one part
-
-
-def largest_of(
-    on: Grid,
-    active: Booleans,
-    counts: Array,
-    previous: int,
-) -> tuple[Indices, int]:
-    """Taxels and peak, as of `all_of`, of the component that
-    `edge.touch.region.largest_region` returns.
-
-    Args:
-        on: the skin's grid, whose bits give taxels.
-        active: as for `components_of`.
-        counts: (rows, cols) of the frame.
-        previous: the region followed so far.
-    """
-    components = components_of(active, on.wraps)
-    peaks = _peaks(components, active, counts)
-    areas = components.areas
-    largest = np.flatnonzero(areas == areas.max())
-    if len(largest) > 1:
-        before = on.unpack(previous)[active[:, :-1]]
-        overlaps = np.bincount(components.of_taxel, before)
-        # The last key counts most; of equal components the first is taken.
-        largest = largest[np.lexsort((-peaks[largest], -overlaps[largest]))]
-    taxels = np.flatnonzero(active)[components.of_taxel == largest[0]]
-    return taxels, int(peaks[largest[0]])

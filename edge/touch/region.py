@@ -10,7 +10,7 @@ import numpy as np
 
 from edge.arrays import Array, Booleans, Indices
 from edge.errors import InputError
-from edge.touch.components import all_of, largest_of
+from edge.touch.components import components_of
 from edge.touch.grid import Grid, grid
 
 
@@ -94,7 +94,7 @@ class ActiveTaxels:
     @cached_property
     def regions(self) -> list[Region]:
         """All regions, as `find_regions` returns them."""
-        components = all_of(self._padded, self.counts, self._grid.wraps)
+        components = components_of(self._padded, self.counts, self._grid.wraps)
         regions = [Region(self._grid, taxels, peak) for taxels, peak in components]
         # Of regions alike in both, the order stays that of their first taxels.
         return sorted(regions, key=lambda region: (-region.area, -region.peak))
@@ -109,9 +109,12 @@ class ActiveTaxels:
         bits = self._grid.flood(self._grid.bit(index) & self.bits, self.bits)
         if bits is not None and 2 * bits.bit_count() > self.bits.bit_count():
             return Region(self._grid, bits, self.counts.item(index))
-        before = 0 if previous is None else previous.bits
-        taxels, peak = largest_of(self._grid, self._padded, self.counts, before)
-        return Region(self._grid, taxels, peak)
+        largest = self.regions[0]
+        if previous is None:
+            return largest
+        before = previous.bits
+        alike = [region for region in self.regions if region.area == largest.area]
+        return max(alike, key=lambda region: (region.bits & before).bit_count())
 
 
 def find_regions(

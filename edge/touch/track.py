@@ -195,8 +195,8 @@ class ContactTracker:
         continues it}."""
         if self.max_contacts > 1:
             return active.regions, shared(self.contacts, active.regions)
-        former = self.contacts[0].region if self.contacts else None
-        largest = active.largest(former)
+        before = self.contacts[0].region if self.contacts else None
+        largest = active.largest(before)
         if largest is None:
             return [], {}
         # The one contact is the largest region, wherever it lies.
@@ -269,9 +269,9 @@ def shared(
     pairs = []
     for contact in contacts:
         for region in regions:
-            former = contact.region
-            if former is not None and former.touches(region):
-                common = (former.bits & region.bits).bit_count()
+            before = contact.region
+            if before is not None and before.touches(region):
+                common = (before.bits & region.bits).bit_count()
                 pairs.append((common, contact, region))
     shares: dict[Contact, Region] = {}
     for _, contact, region in sorted(pairs, key=itemgetter(0), reverse=True):

@@ -5,12 +5,15 @@ last step; `--help` shows them.
 """
 
 import argparse
+import ctypes
 import os
+import signal
 import subprocess
 import sys
 from dataclasses import dataclass
 
 PYTHON = sys.executable
+PR_SET_PDEATHSIG = 1
 PYTEST = (PYTHON, "-m", "pytest", "-n", "2", "--dist", "loadfile")
 BUSY = (*PYTEST, "-m", "not slow")
 SEEDS = (2012, 2013, 2014, 2015, 2016)
@@ -75,7 +78,13 @@ def hard_cases(out, data):
         steps += [
             module("venv", folder),
             (python, "-m", "pip", "install", "--quiet", *packages),
-            module("tests.checks.hard_cases.elsewhere", "--golden", golden, python),
+            module(
+                "tests.checks.hard_cases.elsewhere",
+                "--golden",
+                golden,
+                "--python",
+                python,
+            ),
         ]
     return [*steps, module("tests.checks.hard_cases")]
 
@@ -162,6 +171,12 @@ def listing():
     return "\n".join(f"  {name:<12} {help_of(CHECKS[name])}" for name in CHECKS)
 
 
+def end_with_parent():
+    """Let Linux end this process when its parent has ended, by whatever signal."""
+    if sys.platform == "linux":
+        ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, signal.SIGKILL)
+
+
 def main(words=None):
     """Run the steps of a check; the status of the first that fails."""
     parser = argparse.ArgumentParser(
@@ -177,7 +192,9 @@ def main(words=None):
     steps[-1] = (*steps[-1], *arguments.options)
     environment = os.environ | ENVIRONMENT.get(arguments.name, {})
     for step in steps:
-        status = subprocess.run(step, env=environment, check=False).returncode
+        status = subprocess.run(
+            step, env=environment, check=False, preexec_fn=end_with_parent
+        ).returncode
         if status:
             return status
     return 0

@@ -8,7 +8,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from edge.arrays import Booleans, Integers
-from train.choose.crossval import votes_right
 from train.choose.search import (
     Decomposition,
     SearchGrid,
@@ -82,6 +81,27 @@ class _Fit:
         # One row for each candidate: for each projection, each k.
         rows = right[..., places].transpose(0, 2, 1)
         return np.asarray(rows.reshape(-1, len(self.test)))
+
+
+def votes_right(neighbours: Integers, labels: Integers, truth: Integers) -> Booleans:
+    """Whether the vote of the first 1, 2, ... k neighbours gives the truth.
+
+    Args:
+        neighbours: (..., k) rows, nearest first.
+        labels: (rows,) classes.
+        truth: broadcasts against neighbours[..., 0].
+
+    Returns:
+        (..., k), entry j for k = j + 1. A tie goes to the nearest neighbour among the
+        tied.
+    """
+    classes = labels[neighbours]
+    # votes[..., i, j]: how many of the first j + 1 neighbours are of neighbour i's
+    # class; 0 where neighbour i is not one of them.
+    same = classes[..., :, None] == classes[..., None, :]
+    votes = np.triu(np.cumsum(same, axis=-1, dtype=np.int32))
+    answers = np.take_along_axis(classes, votes.argmax(axis=-2), axis=-1)
+    return np.asarray(answers == np.asarray(truth)[..., None])
 
 
 def answers_without(

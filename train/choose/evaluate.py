@@ -60,7 +60,6 @@ class Result:
         components: of the best settings, or of those most often chosen; 0 where there
             was no choice.
         k: likewise.
-        answers: (n,) the label answered for each trial, or None.
         hits: (n,) whether each trial is answered right, or None; two results on the
             same trials are compared by it.
     """
@@ -69,7 +68,6 @@ class Result:
     total: int
     components: int = 0
     k: int = 0
-    answers: Strings | None = None
     hits: Booleans | None = field(default=None, repr=False, compare=False)
 
     @property

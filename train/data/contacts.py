@@ -14,6 +14,7 @@ from edge.touch.contact import Contact, FeatureSeries
 from edge.touch.frame import Frame
 from edge.touch.layout import SkinLayout, for_device
 from edge.touch.track import ContactTracker
+from train.data.cache import Contacts, kept
 from train.data.labels import completed, contradictory, labels_of
 
 Named = tuple[Recording, Path]
@@ -135,7 +136,7 @@ def collect(
     return Touched(tuple(trials), tuple(untouched), tuple(unused))
 
 
-Followed = tuple[list[tuple[float, FeatureSeries]], list[dict[str, str]]]
+Followed = tuple[Contacts, list[dict[str, str]]]
 """The contacts of a recording, and the labels of those that are trials."""
 
 
@@ -145,23 +146,29 @@ def follow(
     layout: SkinLayout,
     features: Sequence[str],
     joints: int = 0,
+    place: Path | None = None,
     **tracked: Any,
 ) -> Followed:
-    """The contacts of a recording, and the labels of those that are trials."""
+    """The contacts of a recording, and the labels of those that are trials; entries of
+    the cache lie at a place, or nowhere."""
     try:
         layout = for_device(layout, recording.layout)
-        measured = measures(layout, features, joints)
-        tracker = ContactTracker(layout, measures=measured, **tracked)
-        tracker.outside = recording.meta.get("onset") is not None
-        touches = contacts(recording, tracker)
+
+        def touched() -> Contacts:
+            measured = measures(layout, features, joints)
+            tracker = ContactTracker(layout, measures=measured, **tracked)
+            tracker.outside = recording.meta.get("onset") is not None
+            return contacts(recording, tracker)
+
+        chain = tracked.get("chain")
+        how = features, joints, chain and chain.to_dict(), tracked.get("horizon_s")
+        touches = kept(place, recording, layout, how, touched)
         return touches, labels_of(recording, len(touches))
     except InputError as error:
         raise InputError(f"{path}: {error}") from None
 
 
-def contacts(
-    frames: Iterable[Frame], tracker: ContactTracker
-) -> list[tuple[float, FeatureSeries]]:
+def contacts(frames: Iterable[Frame], tracker: ContactTracker) -> Contacts:
     """Onset in seconds and series of every contact of a recording, in their order."""
     followed: dict[int, Contact] = {}
     for frame in frames:

@@ -31,6 +31,7 @@ from edge.record.saving import find
 from edge.touch.arm import Chain
 from edge.touch.layout import SkinLayout
 from train.data.arms import arm_of, joint_angles
+from train.data.cache import prepared
 from train.data.contacts import (
     LabelledFile,
     Named,
@@ -373,6 +374,7 @@ def load_trials(
     partial: bool = False,
     progress: bool = False,
     jobs: int = 1,
+    cached: bool = False,
 ) -> DataSet:
     """Follow the contacts of recordings.
 
@@ -389,6 +391,7 @@ def load_trials(
         partial: keep trials that have a label for some task.
         progress: show progress bars on stderr.
         jobs: processes.
+        cached: keep the contacts beside the recordings, for the next time.
 
     Raises:
         InputError: a file cannot be used, the skins differ, or nothing is labelled or
@@ -405,8 +408,13 @@ def load_trials(
         "features": names,
         "joints": posed.joints,
     }
+    places: dict[Path, Path] = {}
+    if cached:
+        places = prepared(path.parent for _, path in posed.recordings)
     work = [
-        delayed(follow)(recording, path, layout, **tracked)
+        delayed(follow)(
+            recording, path, layout, place=places.get(path.parent), **tracked
+        )
         for recording, path in posed.recordings
     ]
     scratch = recordings.scratch

@@ -95,8 +95,8 @@ class Vectors:
             widths=tuple(compress(self.columns, is_named)),
         )
 
-    def part(self, trials: NDArray[Any]) -> Self:
-        """Some of the trials, by a mask (n,) or by their numbers."""
+    def part(self, trials: NDArray[Any] | slice) -> Self:
+        """Some of the trials, by a mask (n,), by their numbers or by a slice."""
         return replace(
             self,
             X=self.X[..., trials, :],

@@ -114,22 +114,23 @@ def _fold(
     y = {task: labels[~left_out] for task, labels in vectors.y.items()}
     models: list[list[ContactClassifier]] = [[] for _ in runs]
     with single_thread():
-        at_end = replace(vectors, X=vectors.X[-1][~left_out], y=y)
-        shared: Fits = {}
+        shared: list[Fits] = [{} for _ in vectors.X]
         prototypes = [
-            divided(at_end, fittable(choices[-1], y), count, shared) if count else None
+            divided(vectors, ~left_out, choices, count, shared) if count else None
             for choices, count in zip(runs, counts, strict=True)
         ]
         # A decision point at a time, as all together take much memory.
         for point, x in enumerate(vectors.X):
             outside = x[~left_out]
-            fits: Fits = shared if point == len(vectors.X) - 1 else {}
             for run, choices in enumerate(runs):
                 training = replace(vectors, X=outside, y=y, prototypes=prototypes[run])
                 possible = fittable(choices[point], y)
                 models[run].append(
-                    ContactClassifier.of(possible, training, fits, slopes[point])
+                    ContactClassifier.of(
+                        possible, training, shared[point], slopes[point]
+                    )
                 )
+            shared[point].clear()
         return [answers(of_run, vectors.X[:, left_out]) for of_run in models]
 
 

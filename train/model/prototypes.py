@@ -1,15 +1,19 @@
 """Prototypes: the few rows of a model that many trials make.
 
 The trials of a set of labels are divided by k-means among the discriminants of the task
-that has most labels, at the full window. In every space and at every decision point a
-prototype lies at the mean of its trials, so that one trial lies next to it everywhere.
+that has most labels, at the full window and half-way to it: what is alike in the end may
+differ before. In every space and at every decision point a prototype lies at the mean of
+its trials, so that its trials are near everywhere.
 """
+
+from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 from sklearn.cluster import KMeans
 from threadpoolctl import threadpool_limits
 
-from edge.arrays import Floats, Integers
+from edge.arrays import Booleans, Floats, Integers
 from train.data.folds import SEED, finest, label_sets
 from train.data.vectors import MOST_ROWS, Labels, Vectors
 from train.model.pipeline import Choices, Fits, fit_together
@@ -25,24 +29,37 @@ def counts_tried(y: Labels) -> list[int]:
     return [2**power for power in range(most.bit_length())]
 
 
-def divided(vectors: Vectors, choices: Choices, count: int, fits: Fits) -> Integers:
-    """(n,) the prototype of each trial, by its number; those of a set of labels follow
-    one another.
+def divided(
+    vectors: Vectors,
+    trials: Booleans | slice,
+    choices: Sequence[Choices],
+    count: int,
+    fits: Sequence[Fits],
+) -> Integers:
+    """(m,) the prototype of each of some trials, by its number; those of a set of labels
+    follow one another.
 
     Args:
-        vectors: (n, p) at the full window.
-        choices: {task: Choice}.
+        vectors: (decision points, n, p).
+        trials: (n,) mask.
+        choices: {task: Choice} at each decision point.
         count: prototypes of each set of labels, at most.
-        fits: on the same trials, which are taken, and added to.
+        fits: at each decision point, on the same trials, which are taken, and added to.
     """
-    task = finest({task: vectors.y[task] for task in choices})
-    key = ((task, choices[task]),)
-    if key not in fits:
-        fits[key] = fit_together({task: choices[task]}, vectors)
-    coordinates = fits[key][task].space.project(vectors.X)
-    prototypes = np.empty(vectors.trials, dtype=np.int64)
+    last = len(vectors.X) - 1
+    task = finest({task: vectors.y[task] for task in choices[last]})
+    spaces = []
+    for point in sorted({last // 2, last}):
+        at_point = replace(vectors, X=vectors.X[point]).part(trials)
+        choice = {task: choices[point][task]}
+        fitted = fits[point].setdefault(tuple(choice.items()), {})
+        if not fitted:
+            fitted |= fit_together(choice, at_point)
+        spaces.append(fitted[task].space.project(at_point.X))
+    coordinates = np.hstack(spaces)
+    sets = label_sets(at_point.y)
+    prototypes = np.empty(len(sets), dtype=np.int64)
     first = 0
-    sets = label_sets(vectors.y)
     for labels in np.unique(sets):
         members = np.flatnonzero(sets == labels)
         parts = _parts(coordinates[members], count)

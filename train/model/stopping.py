@@ -227,8 +227,9 @@ class SequentialClassifier:
         vectors = vectors.of(features)
         fits: list[Fits] = [{} for _ in vectors.X]
         if self.prototypes:
-            at_end = replace(vectors, X=vectors.X[-1])
-            of_trials = divided(at_end, self.choices, self.prototypes, fits[-1])
+            of_trials = divided(
+                vectors, slice(None), self.choices_at, self.prototypes, fits
+            )
             vectors = replace(vectors, prototypes=of_trials)
         slopes = slopes_at_points([self.choices_at], vectors, self.jobs)
         with single_thread():

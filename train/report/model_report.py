@@ -2,9 +2,11 @@
 candidates."""
 
 import re
+from collections import Counter
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import partial
+from operator import itemgetter
 from pathlib import Path
 from typing import Any
 
@@ -162,9 +164,13 @@ def write(
     """
     exported = Exported(fitted, answers_of(fitted, jobs), model, prices)
     accuracies = [_accuracy(exported, task) for task in fitted.chosen]
-    sections = [*accuracies, *(section(exported) for section in SECTIONS)]
+    sections = [
+        _recordings(fitted),
+        *accuracies,
+        *(section(exported) for section in SECTIONS),
+    ]
     lead = [
-        f"The model was fitted on {counted(model.info.rows, 'trial')}, and decides "
+        f"The model was fitted on {counted(len(fitted.dataset.trials), 'trial')}, and decides "
         f"{model.info.window_s:g} s after the onset of a contact. Its version is "
         f"{model.version}; "
         f"the digest of its recordings begins with {model.info.data_digest[:16]}.",
@@ -176,6 +182,23 @@ def write(
         *(line[0].upper() + line[1:] + "." for line in fitted.notes),
     ]
     return page.write(out, f"Model {model.info.name}", lead, sections)
+
+
+def _recordings(fitted: Fitted) -> Section:
+    """How many trials there are of each label, robot and day."""
+    values: list[tuple[str, str]] = []
+    for trial in fitted.dataset.trials:
+        meta = trial.recording.meta
+        of_trial = {task: trial.labels.get(task, "") for task in fitted.chosen}
+        of_trial |= {key: str(meta.get(key, "")) for key in ("robot", "day")}
+        # A touch that a robot kept says when that was.
+        of_trial["day"] = of_trial["day"] or str(meta.get("kept", ""))[:10]
+        values += filter(itemgetter(1), of_trial.items())
+    rows: list[Row] = [
+        {"key": key, "value": value, "trials": count}
+        for (key, value), count in sorted(Counter(values).items())
+    ]
+    return Section("Recordings", tables=[Table("recordings", "Trials", rows)])
 
 
 def _accuracy(exported: Exported, task: str) -> Section:
@@ -275,10 +298,8 @@ def _sizes(exported: Exported) -> Section:
         f"The model file takes {size:.0f} kB. The candidates' accuracies come from "
         "nested cross-validation, and stand with their 95 % intervals. The times are "
         "for features and decision together on this machine; `edge-classify bench` "
-        "measures those of a board. A star marks the candidate chosen for a task, "
-        "which is the smallest one within a standard error of the best, or among fewer "
-        "than 200 single trials the one with the best grades. A candidate without a "
-        "number was dropped after a few folds, as behind or no better than a cheaper one."
+        "measures those of a board. A star marks the candidate chosen for a task. A "
+        "candidate without a number was dropped after a few folds."
     ]
     return Section(
         "Candidates, sizes and times",

@@ -5,13 +5,17 @@ from typing import Any
 
 import numpy as np
 
-from edge.arrays import Booleans, Floats, Integers
+from edge.arrays import Booleans, Floats
 from edge.decide import statistics
 from edge.features.vector import FEATURES
-from train.choose.crossval import MAX_COMPONENTS, accuracies, neighbours
+from train.choose.answers import answers_without
 from train.choose.evaluate import Result
-from train.data.vectors import Labels, Strings
-from train.model.pipeline import vote
+from train.choose.search import SearchGrid
+from train.data.vectors import Labels, Strings, Vectors
+from train.model.scaling import finite
+
+MOST = 20
+"""Components, and neighbours, that the paper tries."""
 
 
 def percent(share: float) -> float:
@@ -45,20 +49,6 @@ def score(result: Result) -> dict[str, Any]:
     }
 
 
-def voted(rows: Integers, y: Strings, components: int, k: int) -> Result:
-    """The accuracy of a vote among each trial's nearest neighbours.
-
-    Args:
-        rows: (n, components, k) each trial's neighbours, for each number of components.
-        y: (n,) labels.
-        components: number of components.
-        k: number of neighbours that vote.
-    """
-    classes, labels = np.unique(y, return_inverse=True)
-    answers = np.asarray(classes[vote(labels[rows[:, components - 1, :k]])])
-    return Result(int((answers == y).sum()), len(y), components, k, answers)
-
-
 def grid_search(
     X: Floats,
     y: Labels,
@@ -67,20 +57,22 @@ def grid_search(
 ) -> dict[str, Result]:
     """Each task's best leave-one-out accuracy over 1 to 20 components and k (section
     IV-A)."""
-    rows = neighbours(
-        X,
-        scaling=scaling,
-        features=features,
-        max_components=min(MAX_COMPONENTS, len(X) - 1),
-    )
+    n = len(X)
+    numbers = tuple(range(1, min(MOST, n - 1) + 1))
+    grid = SearchGrid(scaling, components=numbers, neighbours=numbers)
+    vectors = Vectors(finite(X), y, features)
+    classes = {task: np.unique(of, return_inverse=True)[1] for task, of in y.items()}
+    by_trial = [
+        answers_without(vectors, classes, np.arange(n) == trial, [grid])
+        for trial in range(n)
+    ]
     results = {}
-    for task, labels in y.items():
-        table = accuracies(rows, labels)
+    for task in y:
+        counts = np.sum([answers[task][:, 0] for answers in by_trial], axis=0)
         # Of equal accuracies the fewest components, then the smallest k.
-        components, k = (
-            int(i) + 1 for i in np.unravel_index(table.argmax(), table.shape)
-        )
-        results[task] = voted(rows, labels, components, k)
+        place = int(np.argmax(counts))
+        choice = grid.choices(1)[place]
+        results[task] = Result(int(counts[place]), n, choice.components, choice.k)
     return results
 
 

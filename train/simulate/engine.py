@@ -330,8 +330,8 @@ def readings(
     batch = physics.trials
     scene = batch.scene
     plan = batch.plan
-    every = np.arange(batch.n) if which is None else which
-    for i in every.tolist():
+    places = np.arange(batch.n) if which is None else which
+    for i in places.tolist():
         counts = np.zeros((len(physics.t), *scene.skin.shape), dtype=np.float32)
         counts[:, :, batch.bed.columns[:, i]] = physics.window[i]
         images = {}

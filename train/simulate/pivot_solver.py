@@ -88,11 +88,13 @@ class Pivots:
         borne = self.gain * elastic + self.load
         bears = (elastic > 0.0) & (borne > 0.0)
         force = np.where(bears, borne, 0.0)
-        held = np.where(bears, self.gain * (touched * self.weight), 0.0)
-        stiffness = total(held)
-        mean = total(held * self.lever) / np.where(stiffness > 0.0, stiffness, 1.0)
+        row_stiffness = np.where(bears, self.gain * (touched * self.weight), 0.0)
+        stiffness = total(row_stiffness)
+        mean = total(row_stiffness * self.lever) / np.where(
+            stiffness > 0.0, stiffness, 1.0
+        )
         off = self.lever - mean
-        spread = total(off * off * held)
+        spread = total(off * off * row_stiffness)
         return Loads(
             total(force),
             total(force * self.lever),

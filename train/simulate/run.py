@@ -102,9 +102,9 @@ def simulate_trials(
 
 def batches_of(scene: Scene) -> list[tuple[TrialSpec, ...]]:
     """Batches of the scene's trials, of about equal work."""
-    every = list(chain.from_iterable(kinds(scene).values()))
-    count = math.ceil(len(every) / batch_size(scene))
-    return [tuple(every[i::count]) for i in range(count)]
+    specs = list(chain.from_iterable(kinds(scene).values()))
+    count = math.ceil(len(specs) / batch_size(scene))
+    return [tuple(specs[i::count]) for i in range(count)]
 
 
 def simulate(scene: Scene) -> Iterator[tuple[str, Recording]]:

@@ -228,10 +228,10 @@ class Trials:
         more = max(added.stop - len(bed["gaps"]), 0)
         if intact is not None and bed["intact"].shape[1] == 1:
             bed["intact"] = np.repeat(bed["intact"], intact.shape[1], axis=1)
-        rest = (0, more), (0, 0)
-        bed["gaps"] = np.pad(bed["gaps"], rest, constant_values=np.inf)
-        bed["stiffness"] = np.pad(bed["stiffness"], rest)
-        bed["intact"] = np.pad(bed["intact"], (*rest, (0, 0)), constant_values=1.0)
+        padding = (0, more), (0, 0)
+        bed["gaps"] = np.pad(bed["gaps"], padding, constant_values=np.inf)
+        bed["stiffness"] = np.pad(bed["stiffness"], padding)
+        bed["intact"] = np.pad(bed["intact"], (*padding, (0, 0)), constant_values=1.0)
         bed["gaps"][added, self.places] = np.where(stiffness > 0.0, gaps, np.inf)
         bed["stiffness"][added, self.places] = stiffness
         if intact is not None:
@@ -242,10 +242,10 @@ class Trials:
         """Set the law of springs (E, m); returns their order by depth."""
         order, gaps, stiffness = by_depth(gaps, stiffness)
         bed = self.bed.arrays
-        rest = (0, max(len(gaps) - len(bed["law_gaps"]), 0)), (0, 0)
-        bed["law_gaps"] = np.pad(bed["law_gaps"], rest, constant_values=np.inf)
-        bed["slopes"] = np.pad(bed["slopes"], rest)
-        bed["intercepts"] = np.pad(bed["intercepts"], rest)
+        padding = (0, max(len(gaps) - len(bed["law_gaps"]), 0)), (0, 0)
+        bed["law_gaps"] = np.pad(bed["law_gaps"], padding, constant_values=np.inf)
+        bed["slopes"] = np.pad(bed["slopes"], padding)
+        bed["intercepts"] = np.pad(bed["intercepts"], padding)
         bed["law_gaps"][: len(gaps), self.places] = gaps
         self.set_lines(*bed_law(gaps, stiffness))
         return order

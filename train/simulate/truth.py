@@ -65,13 +65,13 @@ def contradictions(physics: PhysicsRun) -> list[Contradiction | None]:
     labels = physics.trials.scene.labels
     touched = physics.force > 0.0
     onset = np.argmax(touched, axis=1)
-    every = np.arange(trials.n)
+    numbers = np.arange(trials.n)
     last = onset + round(labels["window_s"] * trials.scene.rate_hz)
     last = np.minimum(last, touched.shape[1] - 1)
 
     def by_then(name: str) -> Any:
         trace = physics.traces.get(name, np.zeros(touched.shape))
-        return np.maximum.accumulate(trace, axis=1)[every, last]
+        return np.maximum.accumulate(trace, axis=1)[numbers, last]
 
     depth = by_then("depth_m")
     slide = by_then("slide_m")

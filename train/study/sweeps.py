@@ -37,7 +37,13 @@ def rows(column: str, results: Results, table: str) -> list[Row]:
 
 def scaling(context: Context) -> Section:
     """Accuracy with each scaling (Table II)."""
-    text = (
+    X = context.vectors()
+    cases = {method: (X, context.labels, method) for method in OF_PAPER}
+    return _compared(
+        context,
+        "scaling",
+        "II",
+        cases,
         "Scaling follows the paper's Eqs. 1 to 5. The statistics of a feature are "
         "taken over all of its samples in the training trials of a fold. Methods I and "
         "II differ only by a constant for each feature, and so do Method III and no "
@@ -45,42 +51,25 @@ def scaling(context: Context) -> Section:
         "the same classifier and has the same accuracy here, up to rounding. In the "
         "paper, the two methods of a pair differ by up to 9.3 points (80 % and 75 %, "
         "72.14 % and 62.86 %). Either its statistics were not taken over all trials, "
-        "or its PCA did not subtract the mean."
-    )
-    cases = {method: (context.vectors(), context.labels, method) for method in OF_PAPER}
-    return _compared(
-        context,
-        "scaling",
-        "Effect of feature scaling (Table II)",
-        "II",
-        cases,
-        text,
+        "or its PCA did not subtract the mean.",
     )
 
 
 def features(context: Context) -> Section:
     """Accuracy with each combination of features (Table III)."""
+    cases = {
+        " ".join(names): (context.vectors(names), context.labels, "none", names)
+        for names in SUBSETS
+    }
     text = (
         "Each feature alone, each pair, and all three together; unscaled, over 1.2 s."
     )
-    cases = {
-        " ".join(names): (context.vectors(names=names), context.labels, "none", names)
-        for names in SUBSETS
-    }
-    return _compared(
-        context,
-        "features",
-        "Effect of the features (Table III)",
-        "III",
-        cases,
-        text,
-    )
+    return _compared(context, "features", "III", cases, text)
 
 
 def _compared(
     context: Context,
     column: str,
-    title: str,
     table: str,
     cases: Mapping[str, tuple[Any, ...]],
     text: str,
@@ -90,16 +79,15 @@ def _compared(
     Args:
         context: the data set.
         column: heading of the settings.
-        title: of the section.
         table: II or III.
         cases: {setting: arguments of `grid_search`}.
         text: the section's paragraph.
     """
     answers = context.workers.map(column, grid_search, list(cases.values()))
-    results = dict(zip(cases, answers, strict=True))
+    cells = rows(column, dict(zip(cases, answers, strict=True)), table)
     heading = f"Accuracy with each choice of {column}"
     return Section(
-        title, [text], [Table(column, heading, rows(column, results, table))]
+        f"Effect of {column} (Table {table})", [text], [Table(column, heading, cells)]
     )
 
 
@@ -117,18 +105,14 @@ def _with_skin(
 def resolution(context: Context) -> Section:
     """Accuracy with larger taxels (Table I)."""
     data = context.dataset
-    labels = context.labels
     recordings = [trial.recording for trial in data.trials]
     skins = [(data.layout, recordings), *coarser(data.layout, recordings)]
-    cases = [(*skin, data.chain, labels) for skin in skins]
+    cases = [(*skin, data.chain, context.labels) for skin in skins]
     answers = context.workers.map("taxel resolution", _with_skin, cases)
-    taxels = [layout.rows * layout.cols for layout, _ in skins]
-    accuracies, counts = zip(*answers, strict=True)
-    results = dict(zip(taxels, accuracies, strict=True))
-    without_contact = dict(zip(taxels, counts, strict=True))
-    cells = rows("taxels", results, "I")
-    for row in cells:
-        row["without contact"] = without_contact[row["taxels"]]
+    cells = []
+    for (layout, _), (results, untouched) in zip(skins, answers, strict=True):
+        for row in rows("taxels", {layout.rows * layout.cols: results}, "I"):
+            cells.append({**row, "without contact": untouched})
     return Section(
         "Effect of taxel resolution (Table I)",
         [

@@ -3,7 +3,7 @@
 from typing import Any
 
 from train.report.figures import PANEL, STROKES, curve, legend, picture, spread
-from train.report.score import majority, percent, points, shares
+from train.report.score import majority, percent, shares
 from train.report.section import Figure, Row, Section, Table
 from train.tradeoff.choices import WINDOWS_S, unseen
 from train.tradeoff.measured import Measurements
@@ -58,40 +58,13 @@ def section(measurements: Measurements) -> Section:
     )
 
 
-def early(measurements: Measurements) -> Section:
-    """Early decisions of each task, compared with waiting for the full window."""
-    rows: list[Row] = [
-        {
-            "task": task,
-            "requested error %": percent(rule.error),
-            "right %": percent(rule.result.accuracy),
-            "mean time s": round(rule.mean_s, 3),
-            "points over waiting": points(rule.gain),
-        }
-        for task, rules in measurements.certified.items()
-        for rule in rules
-    ]
-    return Section(
-        "Early decisions",
-        [
-            "With a requested error rate, the model decides as soon as it is sure "
-            "enough. The mean times are those that the export of all contacts promises; "
-            "rates that it does not certify have no row. Exports without a fifth of the "
-            "contacts, or of the objects, decide these by its rules. A contact unlike "
-            "all trained ones waits for the full window. An object that is unknown gets no "
-            "name, which counts as wrong.",
-        ],
-        [Table("early", "Decisions with a requested error rate", rows)],
-    )
-
-
 def reasons(measurements: Measurements) -> Section:
     """What comes on top of the times, and the commands that export the models."""
     wire = "the time on the skin's wires, which the recordings do not name,"
     if measurements.wire_s is not None:
         wire = f"{1e3 * measurements.wire_s:.1f} ms on the wire"
     notes = [
-        "Each time on this page is that of the touch itself, from first contact. On top "
+        "The time of a decision is that of the touch itself, from first contact. On top "
         f"come {wire} and {1e3 * measurements.board.arithmetic_s:.2f} ms of arithmetic on "
         f"{measurements.board.name}."
     ]
@@ -100,11 +73,17 @@ def reasons(measurements: Measurements) -> Section:
     kind = "quick choice" if commands.quick else "choice of `make export`"
     notes += [
         *measurements.notes,
-        f"All accuracies belong to the {kind}, made at windows of "
+        f"The accuracies after each time belong to the {kind}, made at windows of "
         f"{windows} s. To export one of the measured models, use `{commands.front('fast')}`, or "
         "`balanced` (a window of at most 0.9 s) or `accurate` in place of `fast`; `500` is "
         "the most accurate one within 500 ms, and `0.8` the fastest one that reaches "
         "80 %.",
+        "Early decisions are made as soon as the model is sure enough for a requested "
+        "error rate. Their mean times are those that the export of all contacts promises; "
+        "rates that it does not certify have no row. Exports without a fifth of the "
+        "contacts, or of the objects, decide these by its rules. A contact unlike all "
+        "trained ones waits for the full window. An object that is unknown gets no name, "
+        "which counts as wrong.",
         "The commands of early decisions play a recording; give `run` your `--skin` in "
         "place of `--fake` to decide live. `--error` refuses a rate that the trials "
         "cannot certify, and names the smallest that they can. Leave a margin above it.",

@@ -19,8 +19,7 @@ from train.data.dataset import DataSet
 from train.data.folds import finest, stratified_folds
 from train.data.groups import LEAVE_OUT, TRIAL, groups_of
 from train.fitting import fit
-from train.model.rules import TimeSeries, candidates
-from train.report.score import paired
+from train.model.rules import TimeSeries
 from train.report.work import Workers
 
 FOLDS = 5
@@ -34,9 +33,8 @@ class EarlyDecisions:
     Attributes:
         error: the requested rate.
         mean_s: mean time to decision, which the exported model promises.
-        right: (n,) whether each contact is decided rightly by a model without it. A
+        right: (n,) whether each contact is decided rightly by a model without it. An
             object that is unknown gets no name, which counts as wrong.
-        waited: (n,) whether the same contact is decided rightly at the full window.
         unseen: (m,) whether each contact is decided rightly by a model without its
             object; None where no objects could be held out.
     """
@@ -44,19 +42,12 @@ class EarlyDecisions:
     error: float
     mean_s: float
     right: Booleans
-    waited: Booleans
     unseen: Booleans | None = None
 
     @property
     def result(self) -> Result:
         """The accuracy."""
         return NestedAccuracy(int(self.right.sum()), len(self.right))
-
-    @property
-    def gain(self) -> tuple[float, float, float]:
-        """The points gained over waiting for the full window, and their 95 %
-        interval."""
-        return paired(self.waited, self.right)
 
 
 def certified(
@@ -84,34 +75,21 @@ def certified(
     model = fit(dataset, **options, jobs=jobs).sequential
     assert model is not None
     folds = stratified_folds(y[finest(y)], FOLDS)
-    known = held_out_decisions(dataset, folds, options, jobs)
-    unseen: dict[str, HeldOutDecisions] = {}
+    of_trials = held_out_decisions(dataset, folds, options, jobs)
+    unseen: dict[str, TimeSeries] = {}
     groups = groups_of(dataset, y, LEAVE_OUT, quick=True)
     if groups is not None:
         by_task = held_out_decisions(dataset, groups.folds, options, jobs)
         unseen = {task: by_task[task] for task in groups.tasks}
     return {
-        task: at_errors(stopping, known[task], unseen.get(task))
+        task: at_errors(stopping, of_trials[task], unseen.get(task))
         for task, stopping in model.stopping_.items()
     }
 
 
-@dataclass(frozen=True)
-class HeldOutDecisions:
-    """A task's decisions by models that were fitted without what they decide.
-
-    Attributes:
-        right: (decision points, n) whether each fixed window's label is right.
-        time_series: the same with confidences, which tell when a rule decides.
-    """
-
-    right: Booleans
-    time_series: TimeSeries
-
-
 def held_out_decisions(
     dataset: DataSet, folds: Integers, options: Mapping[str, Any], jobs: int
-) -> dict[str, HeldOutDecisions]:
+) -> dict[str, TimeSeries]:
     """{task: decisions of the trials of each fold (n,) by an export of the others}.
 
     Args:
@@ -129,7 +107,7 @@ def held_out_decisions(
 
 def _without(
     dataset: DataSet, test: Booleans, options: Mapping[str, Any]
-) -> dict[str, HeldOutDecisions]:
+) -> dict[str, TimeSeries]:
     """{task: the decisions of some trials by an export of the others}."""
     fitted = fit(dataset.part(~test), **options, jobs=1)
     model = fitted.sequential
@@ -139,16 +117,11 @@ def _without(
     points = model.decision_points_s
     new = np.stack([test_set.features(s, fitted.samples, names) for s in points])
     truth = {task: test_set.labels(task) for task in model.choices}
-    right, _, series = model.judged(new, truth)
-    return {
-        task: HeldOutDecisions(right[task], time_series)
-        for task, time_series in series.items()
-    }
+    return model.judged(new, truth)[2]
 
 
-def _joined(folds: Sequence[HeldOutDecisions]) -> HeldOutDecisions:
+def _joined(series: Sequence[TimeSeries]) -> TimeSeries:
     """The decisions of several folds together."""
-    series = [fold.time_series for fold in folds]
     confidences = zip(*(time_series.confidences for time_series in series), strict=True)
     wrong = zip(*(time_series.wrong for time_series in series), strict=True)
     withheld = [
@@ -156,17 +129,16 @@ def _joined(folds: Sequence[HeldOutDecisions]) -> HeldOutDecisions:
         for time_series in series
         if time_series.withheld is not None
     ]
-    time_series = TimeSeries(
+    return TimeSeries(
         confidences=list(map(np.hstack, confidences)),
         wrong=list(map(np.hstack, wrong)),
         unusual=np.hstack([time_series.unusual for time_series in series]),
         withheld=np.hstack(withheld) if withheld else None,
     )
-    return HeldOutDecisions(np.hstack([fold.right for fold in folds]), time_series)
 
 
 def at_errors(
-    stopping: Stopping, known: HeldOutDecisions, unseen: HeldOutDecisions | None = None
+    stopping: Stopping, known: TimeSeries, unseen: TimeSeries | None = None
 ) -> list[EarlyDecisions]:
     """The decisions at each error rate that a model certifies; one rule that serves
     several rates stands at the smallest.
@@ -176,17 +148,15 @@ def at_errors(
         known: decisions of known objects.
         unseen: those of objects that were held out.
     """
-    waiting, _ = candidates(len(known.right))
-    _, late = known.time_series.under(waiting)
     rules = {fastest(stopping, error): error for error in reversed(ERRORS)}
     decisions = []
     for rule, error in reversed(rules.items()):
         if rule is None:
             continue
-        _, wrong = known.time_series.under(rule)
+        _, wrong = known.under(rule)
         right = None
         if unseen is not None:
-            _, missed = unseen.time_series.under(rule)
+            _, missed = unseen.under(rule)
             right = ~missed
-        decisions.append(EarlyDecisions(error, rule.mean_s, ~wrong, ~late, right))
+        decisions.append(EarlyDecisions(error, rule.mean_s, ~wrong, right))
     return decisions

@@ -26,7 +26,6 @@ SECTIONS: tuple[Callable[[Measurements], Section], ...] = (
     answer.section,
     costs.section,
     answer.reasons,
-    answer.early,
     lambda measurements: boards.section(measurements.board),
     lambda measurements: Section("Terms", terms=answer.GLOSSARY),
 )

@@ -128,13 +128,18 @@ def cell(percentage):
 
 def our_curves(ours):
     """Our curves of fixed windows, and of stopping when sure at each threshold."""
-    fixed = list(zip(SECONDS, 1.0 - ours.right.mean(axis=1), strict=True))
-    sure = []
-    for threshold in (NEVER, *THRESHOLDS.tolist()):
-        rule = StoppingRule(1.0, 0.0, threshold, len(SECONDS) - 1)
-        # A label counts even where the contact is unlike all trained ones.
-        stops, wrong = replace(ours.time_series, withheld=None).under(rule)
-        sure.append((SECONDS[stops].mean(), wrong.mean()))
+    # A label counts even where the contact is unlike all trained ones.
+    ours = replace(ours, withheld=None)
+    # A fixed window waits for none.
+    hasty = replace(ours, unusual=np.zeros_like(ours.unusual))
+
+    def decided(series, threshold, last):
+        stops, wrong = series.under(StoppingRule(1.0, 0.0, threshold, last))
+        return SECONDS[stops].mean(), wrong.mean()
+
+    end = len(SECONDS) - 1
+    fixed = [decided(hasty, NEVER, last) for last in range(len(SECONDS))]
+    sure = [decided(ours, t, end) for t in (NEVER, *THRESHOLDS.tolist())]
     return {FIXED: [fixed], SURE: [sure]}
 
 

@@ -1,17 +1,13 @@
-"""`python -m tests.checks.hard_cases`: the hard cases as text, and as the table of the page."""
+"""`make hard-cases`: the tables of the hard cases."""
 
-import argparse
 import sys
-import textwrap
-import time
-from collections.abc import Mapping
-from dataclasses import dataclass
 
+from edge.errors import EdgeError
 from tests.checks.bench import tables
+from tests.checks.bench.program import start
 from tests.checks.hard_cases import margins
 from tests.checks.hard_cases.registry import CASES
-
-INDENT = {"initial_indent": " " * 5, "subsequent_indent": " " * 7}
+from train.progress import bar
 
 
 def number(value):
@@ -31,75 +27,52 @@ def place(worst):
     return f"{number(worst.error)} at {', '.join(parameters)} of {worst.count} tried"
 
 
-@dataclass(frozen=True)
-class Entry:
-    """A case in the two tables of the page, and for the terminal.
+def rows_of(case, worst):
+    """How far a case holds, and its oracle with what the usual tools answer: a row of
+    each table."""
+    answer = {
+        "hard case": case.key,
+        "holds to": margins.margin(case),
+        "bound": number(case.bound),
+        "largest error": place(worst),
+    }
+    judge = {
+        "hard case": case.key,
+        "oracle": case.oracle,
+        "error": case.unit,
+        "the usual tools": case.theirs() or "-",
+    }
+    return [
+        {name: text.replace("|", "\\|") for name, text in row.items()}
+        for row in (answer, judge)
+    ]
 
-    Attributes:
-        answer: how far the case holds.
-        judge: the oracle, and what the usual tools answer.
+
+def measure(only):
+    """Print the tables of the cases, which all cases renew; 1 if one exceeds its bound.
+
+    Raises:
+        EdgeError: no case is left.
     """
-
-    answer: Mapping[str, str]
-    judge: Mapping[str, str]
-
-    @classmethod
-    def of(cls, case, worst):
-        """The entry of a case; measures its margin and the usual tools."""
-        answer = {
-            "hard case": case.key,
-            "holds to": margins.margin(case),
-            "bound": number(case.bound),
-            "largest error": place(worst),
-        }
-        judge = {
-            "hard case": case.key,
-            "oracle": case.oracle,
-            "error": case.unit,
-            "the usual tools": case.theirs() or "-",
-        }
-        return cls(_escaped(answer), _escaped(judge))
-
-
-def _escaped(row):
-    return {name: text.replace("|", "\\|") for name, text in row.items()}
-
-
-def printed(case):
-    """Whether a case is within its bound, and its entry, which is printed."""
-    began = time.perf_counter()
-    worst = case.worst()
-    within = worst.error <= case.bound
-    entry = Entry.of(case, worst)
-    took = time.perf_counter() - began
-    print(f"{'ok  ' if within else 'FAIL'} {case.key}  [{took:.1f} s]")
-    for name, text in {**entry.judge, **entry.answer}.items():
-        if text != case.key:
-            print(textwrap.fill(f"{name}: {text}", 96, **INDENT))
-    return within, entry
-
-
-def main(argv=None):
-    """Print the cases; 1 if one exceeds its bound. All of them renew the page's table."""
-    parser = argparse.ArgumentParser(prog="hard_cases", description=__doc__)
-    parser.add_argument("--only", default="", help="cases whose name holds this text")
-    arguments = parser.parse_args(argv)
-    cases = [case for case in CASES if arguments.only in case.key]
+    cases = [case for case in CASES if only in case.key]
     if not cases:
-        parser.error(f"no case's name holds {arguments.only!r}")
-    entries = []
-    beyond = 0
-    for case in cases:
-        within, entry = printed(case)
-        beyond += not within
-        entries.append(entry)
-    print(f"{len(entries)} cases, {beyond} beyond their bound")
+        raise EdgeError(f"no case's name holds {only!r}")
+    rows = []
+    beyond = []
+    for case in bar(cases, desc="hard cases"):
+        worst = case.worst()
+        rows.append(rows_of(case, worst))
+        if not worst.error <= case.bound:
+            beyond.append(case.key)
+    written = map(list, zip(*rows, strict=True))
     if cases == CASES:
-        answers = [entry.answer for entry in entries]
-        judges = [entry.judge for entry in entries]
-        tables.write("hard_cases", [answers, judges], "make hard-cases")
+        tables.write("hard_cases", written, "make hard-cases")
+    else:
+        print("\n\n".join(map(tables.markdown, written)))
+    if beyond:
+        print(f"beyond their bound: {'; '.join(beyond)}", file=sys.stderr)
     return 1 if beyond else 0
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    start(measure, __doc__, ("--only", "", "cases whose name holds this text"))

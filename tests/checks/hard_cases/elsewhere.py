@@ -1,13 +1,14 @@
-"""`python -m tests.checks.hard_cases.elsewhere PYTHON`: hard sets' golden files, by another
-Python of another ONNX Runtime or another architecture.
+"""Golden files of hard sets, asked of another Python, with another ONNX Runtime or on
+another architecture.
 """
 
-import argparse
 import json
 import os
 import subprocess
-import sys
 from pathlib import Path
+
+from edge.errors import EdgeError
+from tests.checks.bench.program import start
 
 ROOT = Path(__file__).parents[3]
 GUEST = """\
@@ -59,27 +60,29 @@ def ask(golden, python, path=""):
     return machine, equal
 
 
-def main(argv=None):
-    """Ask, and say which answers differ from their golden values; 1 if any does."""
-    parser = argparse.ArgumentParser(prog="elsewhere", description=__doc__)
-    parser.add_argument("--golden", type=Path, default=Path("build/hard-cases/golden"))
-    parser.add_argument(
-        "python",
-        nargs="+",
-        help="the command that runs the other Python",
-    )
-    arguments = parser.parse_args(argv)
-    if not sets(arguments.golden):
-        parser.error(f"no golden files are in {arguments.golden}; make them first")
-    machine, equal = ask(arguments.golden, arguments.python, str(ROOT))
+def measure(golden, python):
+    """Ask, and say which answers differ from their golden values; 1 if any does.
+
+    Raises:
+        EdgeError: there are no golden files.
+    """
+    golden = Path(golden)
+    if not sets(golden):
+        raise EdgeError(f"no golden files are in {golden}; make them first")
+    machine, equal = ask(golden, python, str(ROOT))
     differ = [": ".join(key) for key, is_equal in equal.items() if not is_equal]
     print(
         f"ONNX Runtime {machine['onnxruntime']} on {machine['machine']}: {len(equal)} "
-        f"quantities of {len(sets(arguments.golden))} hard sets, of which "
-        f"{len(differ)} differ {differ}"
+        f"quantities of {len(sets(golden))} hard sets, of which {len(differ)} differ "
+        f"{differ}"
     )
     return int(bool(differ))
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    start(
+        measure,
+        __doc__,
+        ("--golden", "build/hard-cases/golden", "the folder of golden files"),
+        ("--python", list, "the command that runs the other Python"),
+    )

@@ -59,13 +59,6 @@ def lattice(seed, n=160):
     return X, queries
 
 
-def duplicates(n, seed):
-    """Rows that stand four times in the set, and the first of them as queries."""
-    order = np.random.default_rng(seed).permutation(n)
-    X = np.repeat(features(n // 4, seed), 4, axis=0)[order]
-    return X, X[:40]
-
-
 def dominated(power, seed):
     """One feature is 10^power times as large as the others, which alone separate the
     rows."""
@@ -98,12 +91,6 @@ def wrong(data, choice):
         return Ours(X, choice=choice).wrong(queries)
 
     return error
-
-
-def ties_error(k, seed):
-    X = features(160, seed)
-    ours = Ours(X, labels_for(X, 12, seed), Choice("none", 6, k))
-    return ours.wrong(features(40, seed + 1))
 
 
 def discriminants_error(shrinkage, seed):
@@ -196,12 +183,6 @@ def answers(name, error, hazard, around, ladder=None, usual=None):
     return Case(key, WHOLE, LISTS, error, hazard, around, ladder, usual, examples=4)
 
 
-BY_ROWS = {
-    "hazard": [{"n": 160, "seed": 0}, {"n": MANY, "seed": 0}],
-    "around": {"n": st.just(160)},
-    "ladder": Ladder("training rows", [160, 1400], "n", "856 and 140"),
-}
-
 CASES = [
     answers(
         "near-duplicate rows, spread 1e-7 to 1e-2 of the norm",
@@ -262,18 +243,12 @@ CASES = [
         ),
         lambda: usual_neighbours(*offset_data(1e6, 0.01, 0)),
     ),
-    answers("exact duplicates", wrong(duplicates, Choice("IV", 20, 4)), **BY_ROWS),
     answers(
         "equal distances",
         wrong(lattice, Choice("none", 6, 8)),
-        **BY_ROWS,
-    ),
-    answers(
-        "vote ties with even k",
-        ties_error,
-        [{"k": k, "seed": 0} for k in (2, 4, 6)],
-        {"k": st.integers(1, 20)},
-        Ladder("neighbours that vote", [2, 8, 32, 160], "k"),
+        [{"n": 160, "seed": 0}, {"n": MANY, "seed": 0}],
+        {"n": st.just(160)},
+        Ladder("training rows", [160, 1400], "n", "856 and 140"),
     ),
     answers(
         "one row, one class, all rows the same, k as large as the training set",

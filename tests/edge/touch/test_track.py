@@ -53,6 +53,14 @@ def test_a_contact_begins_above_the_upper_threshold_and_lasts_to_the_lower():
     assert follow(hovering) == [(0.0, hovering, False)]
 
 
+def test_a_region_with_a_peak_at_onset_takes_no_contacts_place():
+    """It is the largest of three, of which two are followed."""
+    tracker = ContactTracker(FLAT, AT_ONCE, max_contacts=2)
+    places = {(0, 0): 20, (0, 1): 20, (0, 2): 20, (2, 0): 30, (2, 2): 40}
+    contacts = tracker.push(pressed(FLAT, 0.0, places))
+    assert sorted(contact.region.peak for contact in contacts) == [30, 40]
+
+
 def test_a_contact_ends_after_a_time_without_any_taxel():
     """A taxel at the threshold (10 counts here) is not in contact."""
     peaks = [25, 25, 0, 0, 25, 10, 0, 0, 30, 30]

@@ -1,8 +1,13 @@
-"""Tables of values: the same trial in every form, sensors that fall, and what cannot be
-used."""
+"""Tables of values: the same trial in every form, what is asked for with the option
+that mends it, and what cannot be used."""
 
+import gzip
 import io
+import json
+import lzma
 import os
+import tracemalloc
+import zipfile
 
 import numpy as np
 import pandas as pd
@@ -14,58 +19,141 @@ from scipy.io import savemat
 from edge.record.recording import load
 from tests.conftest import python
 from train.__main__ import main
-from train.importers.csv import PANDAS
+from train.commands import import_
+from train.importers import csv
 
-T = np.array([0.0, 0.02, 0.05, 0.06])
-FRAMES = np.arange(24).reshape(4, 2, 3)
-WIDE = np.column_stack([T, FRAMES.reshape(4, 6)])
-ANGLES = np.radians(np.column_stack([90.0 - T, 10.0 * T]))
-
-
-def text(rows, mark=",", head="") -> str:
-    lines = [mark.join(map(str, row)) for row in rows]
-    return "\n".join([*([head] if head else []), *lines]) + "\n"
-
-
-def numbers_alone(folder):
-    (folder / "cup 3.txt").write_text(text(WIDE, "  "))
-    return ["--time", "1"]
+N = 24
+T = np.arange(N) / 100
+COUNTS = np.random.default_rng(5).integers(0, 3, (N, 4))
+"""A touch in the second half."""
+COUNTS[12:] += [40, 300, 150, 80]
+PIXELS = COUNTS.reshape(N, 2, 2)
+TAXELS = ["p1", "p2", "p3", "p4"]
+TABLE = pd.DataFrame(COUNTS, columns=TAXELS)
+TABLE.insert(0, "t", T)
+NS = 1_700_000_000_985_000_000 + 10**7 * np.arange(N)
+RATE = ("--rate", "100")
 
 
-def an_array(folder):
-    (folder / "cup").mkdir()
-    np.save(folder / "cup" / "3.npy", FRAMES)
-    return ["--rate", "50"]
+def text(table=TABLE, **options):
+    """A table of commas."""
+    return table.to_csv(index=False, **options)
 
 
-def a_matlab_file(folder):
-    savemat(folder / "cup-3.mat", {"t": T, "skin": FRAMES, "by": "somebody"})
+def stored(save, *contents, **options):
+    """The bytes that a function saves."""
+    file = io.BytesIO()
+    save(file, *contents, **options)
+    return file.getvalue()
 
 
-def write_frames(folder, times, frames, names="{1:.3f}"):
-    """A trial: CSV files that are named by their times, or by their numbers."""
-    folder.mkdir(parents=True)
-    for i, (t, frame) in enumerate(zip(times, frames, strict=True)):
-        np.savetxt(folder / f"{names.format(i, t)}.csv", frame, fmt="%d", delimiter=",")
+def timed(t, name="t"):
+    """The table with other times, whose column has another name."""
+    return TABLE.assign(t=t).rename(columns={"t": name})
 
 
-def a_file_for_each_frame(folder):
-    write_frames(folder / "cup-3", 8.0 + T, FRAMES)
-    return ["--frames"]
+def lines(form):
+    """A line for each frame."""
+    return "".join(form.format(t, *row) for t, row in zip(T, COUNTS, strict=True))
 
 
-def a_numbered_file_for_each_frame(folder):
-    write_frames(folder / "cup" / "3", T, FRAMES, "frame-{0:04}")
-    return ["--frames", "--rate", "50"]
+def movie(form):
+    frames = "".join(
+        f"\nFrame {i}{form.format(*row)}" for i, row in enumerate(COUNTS.tolist(), 1)
+    )
+    return f"SECONDS_PER_FRAME 0.01\nASCII_DATA @@\n{frames}@@"
 
 
-def a_long_table_of_values(folder):
-    rows = [
-        ("3", "cup", t, taxel, count)
-        for t, frame in zip(T, FRAMES, strict=True)
-        for taxel, count in enumerate(frame.ravel())
-    ]
-    (folder / "all.csv").write_text(text(rows[::-1], ";", "trial;object;t;taxel;value"))
+def zipped(content):
+    file = io.BytesIO()
+    with zipfile.ZipFile(file, "w") as archive:
+        archive.writestr("a.csv", content)
+    return file.getvalue()
+
+
+PLAIN = text()
+STAMPS = timed(NS // 10**9)
+STAMPS.insert(1, "ns", NS % 10**9)
+DAYS = timed(pd.to_datetime(NS).astype(str), "zeit").astype(
+    dict.fromkeys(TAXELS, float)
+)
+LONG = TABLE.melt("t", var_name="sensor_id")[::-1]
+PLX = "CLEARDATA\nLABEL,Date,millis,p1,p2,p3,p4\nRESETTIMER\nDATA,DATE,"
+ECHO = timed(NS, "%time").assign(id="pad").rename(columns=lambda name: f"field.{name}")
+SAMPLE = {"interval_ms": 10, "sensors": [{"name": name} for name in TAXELS]}
+LISTS = TABLE[["t"]].assign(skin=[{"p": row} for row in COUNTS.tolist()])
+FORMS = {
+    "plain": ("cup_1.csv", PLAIN),
+    "a comma at the end": ("cup_1.csv", text(TABLE.assign(**{"": ""}))),
+    "an index without a name": ("cup_1.csv", TABLE.to_csv()),
+    "a class among the columns": ("cup_1.csv", text(TABLE.assign(label=3))),
+    "another order": ("cup_1.csv", text(TABLE[TABLE.columns[::-1]])),
+    "BOM, CRLF, semicolons, decimal commas, dates": (
+        "cup_1.csv",
+        "\ufeff" + text(DAYS, sep=";", decimal=",", lineterminator="\r\n"),
+    ),
+    "UTF-16": ("cup_1.txt", text(sep="\t").encode("utf-16")),
+    "names in a comment": ("cup_1.dat", "# me\n# " + text(sep=" ")),
+    "numbers alone": ("cup_1.txt", text(sep="|", header=False), "--time", "1"),
+    "lines above, among and below": (
+        "cup_1.csv",
+        "Device: X\nGain,2,dB\n\n" + PLAIN.replace("\n0.05", "\n0\n\n0.05") + "end\n",
+    ),
+    "a row of units": (
+        "cup_1.csv",
+        text(timed(10_000 * np.arange(N), "Time")).replace(
+            "p4\n", "p4\n[us],N,N,N,N\n"
+        ),
+    ),
+    "units in names": (
+        "cup_1.csv",
+        text(TABLE.set_axis(["Zeit (s)", *(f"F {i} [N]" for i in range(4))], axis=1)),
+    ),
+    "ms since 1970": ("cup_1.csv", text(timed(NS // 10**6))),
+    "rostopic echo -p": ("cup_1.csv", text(ECHO).replace("field.%", "%")),
+    "ros2 topic echo": ("cup_1.csv", text(STAMPS, header=False), "--taxels", "3-6"),
+    "of a frame": (
+        "cup_1.csv",
+        text(STAMPS, header=False).replace("5000000,", "5000000,pad,"),
+        "--taxels",
+        "4-7",
+    ),
+    "PLX-DAQ": (
+        "cup_1.csv",
+        PLX
+        + text(timed(10 * np.arange(N)), header=False).replace("\n", "\nDATA,DATE,"),
+    ),
+    "serial monitor": (
+        "cup_1.log",
+        "Hi\n" + lines("12:00:{0:06.3f} -> p1:{1}\tp2:{2}\tp3:{3}\tp4:{4}\n"),
+    ),
+    "serial plotter": ("cup_1.log", lines("p1={1}, p2={2}, p3={3}, p4={4}\n"), *RATE),
+    "Tekscan": ("cup_1.asf", movie("\n{},{}\n{},{}\n")),
+    "Tekscan without a step": ("cup_1.txt", movie("\n{}  {}\n{}  {}\n"), *RATE),
+    "Edge Impulse": (
+        "cup.5ab.json",
+        json.dumps({"payload": SAMPLE | {"values": COUNTS.tolist()}}),
+    ),
+    "JSON": ("cup_1.json", TABLE.to_json(orient="records")),
+    "JSON lines": ("cup_1.jsonl", LISTS.to_json(orient="records", lines=True)),
+    "a row for each value": ("cup_1.csv", text(LONG)),
+    "long table": (
+        "all.csv",
+        "trial,object," + PLAIN.replace("\n0", "\n7,cup,0"),
+        "--taxels",
+        "4-7",
+    ),
+    "gzip": ("cup_1.csv.gz", gzip.compress(PLAIN.encode())),
+    "xz": ("cup_1.csv.xz", lzma.compress(PLAIN.encode())),
+    "zip": ("cup_1.csv.zip", zipped(PLAIN)),
+    "NPY": ("cup/3.npy", stored(np.save, PIXELS), *RATE),
+    "NPZ": ("cup_1.npz", stored(np.savez, t=T, skin=COUNTS.T)),
+    "MAT of two orientations": (
+        "cup_1.mat",
+        stored(savemat, {"frames": PIXELS, "pose": np.zeros((6, N)), "by": "me"}),
+        *(*RATE, "--taxels", "frames", "--joints", "pose"),
+    ),
+}
 
 
 def put(folder, files):
@@ -86,174 +174,182 @@ def imported(folder, *words):
     return status, {file.stem: load(file) for file in sorted(out.glob("*.npz"))}
 
 
-@pytest.mark.parametrize(
-    "form",
-    [
-        numbers_alone,
-        an_array,
-        a_matlab_file,
-        a_long_table_of_values,
-        a_file_for_each_frame,
-        a_numbered_file_for_each_frame,
-    ],
-)
-def test_the_same_trial_comes_out_of_every_form(form, folder):
-    words = form(folder) or []
-    status, recordings = imported(folder, "--shape", "2x3", *words)
+def flat(recording):
+    """(n, taxels) counts."""
+    return recording.frames.reshape(len(recording.t), -1).tolist()
+
+
+def require_the_trial(folder, *words):
+    """Import the one trial, which has the counts and the times."""
+    status, recordings = imported(folder, *words)
     assert status == 0
     (trial,) = recordings.values()
-    assert (trial.frames == FRAMES).all()
-    assert trial.t == pytest.approx(np.arange(4) / 50 if "--rate" in words else T)
+    assert flat(trial) == COUNTS.tolist()
+    assert trial.t == pytest.approx(T, abs=1e-6)
     assert trial.labels == {"object": "cup"}
+
+
+@pytest.mark.parametrize("form", FORMS)
+def test_the_same_trial_comes_out_of_every_form(form, folder):
+    name, content, *words = FORMS[form]
+    put(folder, {name: content})
+    require_the_trial(folder, *words)
+
+
+@pytest.mark.parametrize(
+    ("name", "words"), [("{1:.2f}.csv", ()), ("frame-{0:04}.csv", RATE)]
+)
+def test_a_folder_for_each_trial_has_a_file_for_each_frame(folder, name, words):
+    frames = zip(T, PIXELS, strict=True)
+    files = {
+        f"cup_1/{name.format(i, 8.0 + t)}": text(pd.DataFrame(frame), header=False)
+        for i, (t, frame) in enumerate(frames)
+    }
+    put(folder, files)
+    require_the_trial(folder, "--frames", *words)
+
+
+def test_the_index_of_a_parquet_table_is_a_column(folder):
+    pytest.importorskip("pyarrow")
+    TABLE.set_index("t").to_parquet(folder / "cup_1.parquet")
+    require_the_trial(folder)
+
+
+RAW = TABLE.assign(**(700 + TABLE[TAXELS]))
+HEAD = "t,p1,p2,p3,p4\n"
+MENDS = {
+    "raw values that rise": (text(RAW), "--signed"),
+    "raw values that fall": (text(TABLE.assign(**(700 - TABLE[TAXELS]))), "--falls"),
+    "fractions": (text(TABLE.assign(**(TABLE[TAXELS] / 10))), "--scale 10"),
+    "no time": (text(TABLE[TAXELS]), "--rate 100"),
+    "another name of the time": (text(timed(T, "wann (?)")), "--time 1"),
+    "a time that stands still": (text(timed(np.arange(N) // 10 / 10)), "--rate 100"),
+    "units in doubt": (text(timed(range(N))), "--time-unit s"),
+    "fingers": (PLAIN.replace(HEAD, "t,a,b,c,d\n"), "--taxels a-d"),
+    "names with commas": (
+        text(sep=";").replace(HEAD.replace(",", ";"), "t;(0,0);(0,1);(1,0);(1,1)\n"),
+        "--taxels 2-5",
+    ),
+    "two sensors": (PLAIN.replace("p3,p4", "q1,q2"), "--taxels p1-p2"),
+    "degrees": (text(TABLE.assign(elbow=40.0 + T)), "--degrees", "--joints", "elbow"),
+    "a label that changes": (text(TABLE.assign(label=["a", "b"] * 12)), "--label 1"),
+    "rows counted in a column": (
+        TABLE[TAXELS].to_csv(header=False),
+        "--taxels 2,3,4,5",
+        *RATE,
+    ),
+}
+
+
+@pytest.mark.parametrize("kind", MENDS)
+def test_what_is_unclear_is_asked_for_with_the_option_that_mends_it(
+    kind, folder, refused
+):
+    content, option, *words = MENDS[kind]
+    put(folder, {"cup_1.csv": content})
+    message = refused("csv", folder, *words)
+    assert "cup_1.csv" in message
+    assert option in message
+    status, recordings = imported(folder, *words, *option.split())
+    assert status == 0
+    (trial,) = recordings.values()
+    assert trial.frames.max() >= 280
+    assert trial.frames[:11].max() <= 3
+    assert trial.labels == {"object": "cup"}
+
+
+@pytest.mark.parametrize(
+    ("files", "words", "word"),
+    [
+        ({"1.npy": stored(np.save, np.zeros((0, 3)))}, RATE, "1.npy"),
+        ({"1.txt": "1 2\n"}, (*RATE, "--shape", "2x2"), "--shape"),
+        ({"all.csv": "trial,t,p1\na,0,1\na,1,2\n"}, ("--time", "1"), "column trial"),
+        ({}, (), "in: holds no file .csv"),
+        ({"a/0.csv": "1 2\n", "a/b.csv": "1 2\n"}, ("--frames",), "--rate"),
+        ({"a/0.csv": "1 2\n", "a/1.csv": "1\n2\n"}, ("--frames",), "1.csv"),
+        ({"a/0.npy": stored(np.save, np.array(["x"]))}, ("--frames",), "0.npy"),
+        ({"a/1.png": b"\x89PNG"}, ("--frames", *RATE), "picture"),
+        ({"1.txt": "1 2\n", "labels.csv": "trial,who\n2,me\n"}, RATE, "labels.csv"),
+        (
+            {"1.txt": "1 2\n", "labels.csv": "trial,object\n1,box\n1,cup\n"},
+            RATE,
+            "labels.csv, line 3",
+        ),
+        ({"all.csv": "trial,p1\n../1,2\n"}, RATE, "'../1'"),
+        # Long tables that contradict themselves.
+        ({"all.csv": "trial,t,taxel,value\na,0,1,5\na,0,1,6\n"}, (), "taxel 1"),
+        ({"all.csv": "trial,t,taxel,value\na,0,0,1\na,1,1,1\n"}, (), "in common"),
+        ({"all.csv": "trial,frame,step,taxel,value\na,1,2,1,1\n"}, (), "--time COL"),
+        (
+            {"all.csv": "trial,object,t,p1\na,box,0,1\na,cup,1,1\n"},
+            (),
+            "object changes",
+        ),
+        ({"all.csv": "trial,t,p1\na,0,1\n,1,1\n,2,1\n"}, (), "line 3 has no trial"),
+        (
+            {"all.csv": "trial,t,taxel,value\na,0,1,5\na,1,,6\n"},
+            (),
+            "line 3 has no taxel",
+        ),
+        # Hostile files of each form.
+        ({"a.json": "[" * 9000}, RATE, "a.json"),
+        ({"a.json": '{"t": 0, "s": [1, [2]]}'}, (), "a.json"),
+        ({"a.npz": b"PK\x03\x04" + bytes(40)}, RATE, "a.npz"),
+        ({"a.mat": b"MATLAB 5.0 MAT-file" + bytes(200)}, RATE, "a.mat"),
+        ({"a.mat": b"MATLAB 7.3 MAT-file" + bytes(600)}, RATE, "a.mat"),
+        ({"a.parquet": b"PAR1" + bytes(40)}, RATE, "a.parquet"),
+        ({"a.csv.gz": b"\x1f\x8b" + bytes(40)}, RATE, "a.csv.gz"),
+        ({"a.csv.zip": b"PK" + bytes(40)}, RATE, "a.csv.zip"),
+        ({"a.csv": "s1,s1\n1,2\n"}, RATE, "a.csv"),
+        ({"a.csv": f"s1,s2\n{'9' * 400},1\n1,1\n"}, RATE, "a.csv"),
+        ({"a.asc": "Frame 1\n1,2\nFrame 2\n1\n"}, RATE, "a.asc"),
+        ({"a.csv": "CLEARDATA\nLABEL,t,s1\nDATA,x\n"}, RATE, "a.csv"),
+    ],
+)
+def test_what_cannot_be_used_is_one_sentence(files, words, word, folder, refused):
+    assert word in refused("csv", put(folder, files), *words)
 
 
 def test_the_lines_of_pandas_make_a_recording(folder, refused):
     put(folder, {"cup_1.csv": "t,thumb,index\n0,1,2\n0.1,3,4\n"})
     refused("csv", folder)
-    program = PANDAS.partition("\n")[2].replace('"s1", "s2"', '"thumb", "index"')
+    program = csv.PANDAS.partition("\n")[2].replace('"s1", "s2"', '"thumb", "index"')
     python("-c", program, cwd=folder)
-    assert load(folder / "cup_1.npz").frames.tolist() == [[[1, 2]], [[3, 4]]]
+    assert flat(load(folder / "cup_1.npz")) == [[1, 2], [3, 4]]
 
 
-def test_a_file_whose_columns_are_not_those_of_most_is_left_out(folder, capsys):
-    put(folder, {"1.txt": "1 2\n", "2.txt": "1 2 3\n", "3.txt": "1 2\n"})
+def test_one_bad_trial_stops_none_of_the_others(folder, capsys):
+    files = {"1.txt": "1 2\n", "2.txt": "1 2 3\n", "3.txt": "1 2\n"}
+    put(folder, files)
     status, recordings = imported(folder, *RATE)
     assert status == 1
     assert list(recordings) == ["1", "3"]
     assert "2.txt" in capsys.readouterr().err
+    back = "# me\ntrial,t,p1\na,0,1\na,10,2\nb,0,1\nb,10,2\nb,0,3\n"
+    put(folder, {"all.csv": back})
+    status, recordings = imported(folder)
+    assert status == 1
+    assert "a" in recordings
+    message = capsys.readouterr().err
+    assert "all.csv: trial b" in message
+    assert "line 7" in message
 
 
-def test_the_first_frame_of_a_folder_is_the_earliest(folder):
-    write_frames(folder / "cup", [10.0, 9.0], FRAMES[:2], "{1:g}")
-    _, recordings = imported(folder, "--frames")
-    assert (recordings["cup"].frames == FRAMES[1::-1]).all()
-    assert recordings["cup"].t.tolist() == [0.0, 1.0]
+def test_neither_values_nor_recordings_stay_in_the_memory(folder, monkeypatch):
+    """Sixteen megabytes of values are imported within four."""
+    held = []
 
+    def look(recordings):
+        held.append(tracemalloc.get_traced_memory()[0])
+        return ""
 
-def test_trials_may_be_numbered_in_an_array(folder):
-    rows = np.array([[0.0], [0.0], [7.0]])
-    savemat(
-        folder / "all.mat",
-        {"trial": rows, "t": np.array([[0.0], [0.1], [0.0]]), "a": rows},
-    )
-    _, recordings = imported(folder, "--taxels", "a")
-    assert {name: len(trial.t) for name, trial in recordings.items()} == {
-        "0.0": 2,
-        "7.0": 1,
-    }
-
-
-def table(folder, rows, *words):
-    """The frames of a table of commas, flat, and its joint angles."""
-    put(folder, {"cup_1.csv": rows})
-    _, recordings = imported(folder, *words)
-    (trial,) = recordings.values()
-    return trial.frames.reshape(len(trial.t), -1).tolist(), trial.joints
-
-
-def test_names_in_the_comment_stand_above_texts_too(folder):
-    """As `rostopic echo -p` writes them."""
-    head = "%time,field.header.frame_id,field.data0,field.data1\n"
-    rows = f"{head}1700000000000000000,pad,3,4\n1700000000010000000,pad,5,6\n"
-    assert table(folder, rows)[0] == [[3, 4], [5, 6]]
-
-
-def test_columns_of_one_name_are_taken_as_pandas_tells_them_apart(folder):
-    rows = "time_s,sensor,sensor.1,sensor.2\n0.0,1,2,3\n0.1,4,5,6\n"
-    assert table(folder, rows)[0] == [[1, 2, 3], [4, 5, 6]]
-
-
-def test_joint_angles_in_rows_of_their_own_are_interpolated(folder, capsys):
-    rows = "time_s,s1,s2,q\n0.0,,,0.0\n0.1,1,2,\n0.2,,,0.2\n0.9,3,4,\n"
-    frames, joints = table(folder, rows, "--taxels", "s1,s2", "--joints", "q")
-    assert frames == [[1, 2], [3, 4]]
-    np.testing.assert_allclose(joints, [[0.1], [np.nan]])
-    assert "lacks joint angles for 1 of 2 frames" in capsys.readouterr().out
-
-
-def test_joints_fractions_gaps_and_files_beside(folder):
-    rows = [[0.5 * i, "nan", 90, -90] for i in range(3)]
-    files = {
-        "a.csv": text(rows, head="left,right,q.1,q.2"),
-        "labels.csv": "\ufefftrial,object,who\na,bear,me\n",
-        "skin.json": '{"rows": 2, "cols": 1, "threshold_counts": 3}',
-    }
-    put(folder, files)
-    words = ["--rate", "10", "--joints", "q", "--degrees", "--scale", "10"]
-    words += ["--taxels", "left,right"]
-    status, recordings = imported(folder, *words)
-    assert status == 0
-    trial = recordings["a"]
-    assert trial.frames[:, :, 0].tolist() == [[0, 0], [5, 0], [10, 0]]
-    assert trial.valid[:, :, 0].tolist() == [[True, False]] * 3
-    assert trial.joints == pytest.approx(np.radians([[90, -90]] * 3))
-    assert trial.labels == {"object": "bear", "who": "me"}
-    assert trial.layout.threshold_counts == 3
-    assert trial.meta["arm"] is None
-
-
-def stored(array) -> bytes:
-    file = io.BytesIO()
-    np.save(file, array)
-    return file.getvalue()
-
-
-RATE = ("--rate", "1")
-
-
-@pytest.mark.parametrize(
-    ("files", "words", "sentence"),
-    [
-        (
-            {"1.npy": stored(np.zeros((0, 3)))},
-            RATE,
-            "1.npy: holds no values; leave it out or save it again",
-        ),
-        (
-            {"1.txt": "1 2\n"},
-            (*RATE, "--shape", "2x2"),
-            "2 values a frame are no 2 x 2 taxels; give --shape",
-        ),
-        (
-            {"all.csv": "trial,t,p1\na,0,1\na,1,2\n"},
-            ("--time", "1"),
-            "all.csv: trial a: column trial holds no values of a frame",
-        ),
-        ({}, (), "in: holds no file .csv"),
-        (
-            {"a/0.csv": "1 2\n", "a/b.csv": "1 2\n"},
-            ("--frames",),
-            "a: not a folder of files that ",
-        ),
-        (
-            {"a/0.csv": "1 2\n", "a/1.csv": "1\n2\n"},
-            ("--frames",),
-            "1.csv: is (2, 1) taxels, and ",
-        ),
-        (
-            {"a/0.npy": stored(np.array(["x"]))},
-            ("--frames",),
-            "0.npy: not a frame: could not convert string to float",
-        ),
-        (
-            {"1.txt": "1 2\n", "labels.csv": "trial,who\n2,me\n"},
-            RATE,
-            "labels.csv: needs a column file with names such as ['1']",
-        ),
-        (
-            {"1.txt": "1 2\n", "labels.csv": "trial,object\n1,box\n1,cup\n"},
-            RATE,
-            "labels.csv, line 3: 1 has line 2 too; remove one of them",
-        ),
-        (
-            {"all.csv": "trial,p1\n../1,2\n"},
-            RATE,
-            "all.csv: the trial '../1' needs a name ",
-        ),
-    ],
-)
-def test_what_cannot_be_used_is_one_sentence(files, words, sentence, folder, refused):
-    assert sentence in refused("csv", put(folder, files), *words)
+    monkeypatch.setattr(import_, "with_thresholds", look)
+    for i in range(16):
+        np.save(folder / f"{i}.npy", np.full((2000, 64), i, np.uint16))
+    tracemalloc.start()
+    imported(folder, *RATE, "--preview")
+    tracemalloc.stop()
+    assert held[0] < 4e6
 
 
 TABLES = int(os.environ.get("TABLES", "20"))
@@ -265,18 +361,20 @@ STEP_S = 0.02
 def tables(draw):
     """Counts, and a text of them: any order of the columns, separator, decimal sign and
     unit, and columns that are no taxels."""
-    rows = draw(st.integers(4, 12))
+    count = draw(st.integers(4, 12))
     taxels = draw(st.integers(1, 12))
     rng = np.random.default_rng(draw(st.integers(0, 10**6)))
-    values = rng.integers(0, 1000, (rows, taxels))
-    table = pd.DataFrame(values, columns=[f"p{i + 1}" for i in range(taxels)])
-    table["t"] = STEP_S * draw(st.sampled_from([1.0, 1e3, 1e6])) * np.arange(rows)
+    values = rng.integers(0, 1000, (count, taxels))
+    frames = pd.DataFrame(values, columns=[f"p{i + 1}" for i in range(taxels)])
+    frames["t"] = STEP_S * draw(st.sampled_from([1.0, 1e3, 1e6])) * np.arange(count)
     for name in draw(st.sets(st.sampled_from(["label", "", "temperature", "frame"]))):
-        table[name] = rng.integers(0, 9, rows)
+        frames[name] = rng.integers(0, 9, count)
     mark = draw(st.sampled_from([",", ";", "\t", "|"]))
     decimal = "." if mark == "," else draw(st.sampled_from([".", ","]))
-    columns = draw(st.permutations(sorted(table)))
-    return values, table.to_csv(columns=columns, sep=mark, decimal=decimal, index=False)
+    columns = draw(st.permutations(sorted(frames)))
+    return values, frames.to_csv(
+        columns=columns, sep=mark, decimal=decimal, index=False
+    )
 
 
 @settings(max_examples=TABLES, deadline=None)
@@ -287,158 +385,106 @@ def test_generated_tables_arrive_as_they_were(tmp_path_factory, table):
     put(folder, {"cup.csv": contents})
     status, recordings = imported(folder)
     assert status == 0
-    recording = recordings["cup"]
-    assert (recording.frames.reshape(values.shape) == values).all()
-    assert recording.t == pytest.approx(STEP_S * np.arange(len(values)))
-
-
-ROWS = range(8)
-UNNAMED = {
-    "rows": [[f"{i} {7 - i % 2}\n" for i in ROWS]],
-    "times": [[f"{7 - i % 2} {20 * i}\n" for i in ROWS]],
-    "class": [[f"{7 - i % 2} {label}\n" for i in ROWS] for label in (1, 2)],
-}
-
-
-@pytest.mark.parametrize("kind", UNNAMED)
-def test_a_column_without_a_name_that_may_be_no_taxel_is_asked_for(
-    folder,
-    refusal,
-    kind,
-):
-    files = {f"{i}.txt": "".join(rows) for i, rows in enumerate(UNNAMED[kind])}
-    put(folder, files)
-    words = ("import", "csv", folder, "--out", folder.parent / "out", *RATE)
-    column = 1 if kind == "rows" else 2
-    sentence = (
-        f"column {column} counts up, or tells the trials apart; name the taxels by"
-    )
-    assert sentence in refusal(*words)
-    assert main([*map(str, words), "--taxels", "1-2"]) == 0
-
-
-def test_a_column_that_stays_the_same_in_all_trials_is_a_taxel(folder):
-    rows = "".join(f"{7 - i % 2} 5\n" for i in ROWS)
-    put(folder, {"1.txt": rows, "2.txt": rows + "3 5\n"})
-    status, recordings = imported(folder, *RATE)
-    assert status == 0
-    assert recordings["1"].frames.shape == (8, 1, 2)
-
-
-def test_numbers_of_columns_count_in_the_file_as_it_stands(folder):
-    put(folder, {"all.csv": "trial,object,t,p1,p2\na,box,0,1,2\na,box,0.1,51,62\n"})
-    _, recordings = imported(folder, "--taxels", "4-5")
-    assert recordings["a"].frames[-1].tolist() == [[51, 62]]
-
-
-def test_a_number_among_words_is_a_label_where_it_stays_the_same(folder):
-    rows = [(trial, trial, f"at {t}", t, t) for trial in ("7", "cup") for t in (0, 10)]
-    put(folder, {"all.csv": text(rows, head="trial,kind,phase,t,p1")})
-    _, recordings = imported(folder)
-    assert recordings["7"].labels == {"kind": "7"}
-    assert recordings["cup"].labels == {"kind": "cup"}
-
-
-def test_numbers_that_a_parquet_file_holds_as_texts_are_labels(folder):
-    pytest.importorskip("pyarrow")
-    rows = [("a", "1", t, t) for t in (0, 10)]
-    rows += [("b", None, t, t) for t in (0, 10)]
-    table = pd.DataFrame(rows, columns=["trial", "softness", "t", "p1"])
-    table.astype({"softness": "category"}).to_parquet(folder / "all.parquet")
-    _, recordings = imported(folder)
-    assert recordings["a"].labels == {"softness": "1"}
-    assert recordings["b"].labels == {}
-
-
-def test_one_value_in_a_row_has_the_time_that_is_called_one(folder, capsys):
-    rows = [("a", 3, t, taxel, t) for t in (0, 10, 20) for taxel in (0, 1)]
-    put(folder, {"all.csv": text(rows, head="trial,class,t,taxel,value")})
-    _, recordings = imported(folder)
-    assert recordings["a"].t.tolist() == [0.0, 0.01, 0.02]
-    assert 'ignored: "class"' in capsys.readouterr().out
-
-
-def test_a_bad_trial_of_a_long_table_stops_none_of_the_others(folder, capsys):
-    rows = [("a", 0, 1), ("a", 10, 2), ("b", 0, 1), ("b", 10, 2), ("b", 0, 3)]
-    put(folder, {"all.csv": "# me\n" + text(rows, head="trial,t,p1")})
-    status, recordings = imported(folder)
-    assert status == 1
-    assert list(recordings) == ["a"]
-    sentence = (
-        "all.csv: trial b: its time goes back by 0.01 s at line 7; split it there"
-    )
-    assert sentence in capsys.readouterr().err
-
-
-def test_dates_that_run_within_a_trial_are_its_times(folder):
-    day = "2024-02-01T00:00"
-    rows = [("a", day, f"2024-03-01T10:00:00.{n}", n) for n in range(3)]
-    put(folder, {"all.csv": text(rows, head="trial,made,when,p1")})
-    _, recordings = imported(folder)
-    assert recordings["a"].t == pytest.approx([0.0, 0.1, 0.2])
-    assert recordings["a"].labels == {"made": day}
+    assert flat(recordings["cup"]) == values.tolist()
+    assert recordings["cup"].t == pytest.approx(STEP_S * np.arange(len(values)))
 
 
 @pytest.mark.parametrize(
-    ("table", "sentence"),
+    ("contents", "is_asked"),
     [
-        (
-            text([("a", 0, 1, 5), ("a", 0, 1, 6)], head="trial,t,taxel,value"),
-            "two values of taxel 1 at time 0; a column trial would tell",
-        ),
-        (
-            text([("a", i, i, 1) for i in range(2)], head="trial,t,taxel,value"),
-            "the taxels need times in common",
-        ),
-        (
-            text([("a", 1, 2, 1, 1)], head="trial,frame,step,taxel,value"),
-            "give --time COL",
-        ),
-        (
-            text([("a", "box", 0, 1), ("a", "cup", 1, 1)], head="trial,object,t,p1"),
-            "object changes, as in ['box', 'cup']",
-        ),
-        (
-            text([("a", 0, 1), ("", 1, 1), ("", 2, 1)], head="trial,t,p1"),
-            "all.csv: line 3 has no trial; enter it, or leave the row out",
-        ),
-        (
-            text([("a", 0, 1, 5), ("a", 1, "", 6)], head="trial,t,taxel,value"),
-            "all.csv: trial a: line 3 has no taxel; enter it, or leave the row out",
-        ),
+        ([[[7 - i % 2, 20 * i] for i in range(8)]], True),  # times
+        ([[[7 - i % 2, label] for i in range(8)] for label in (1, 2)], True),  # a class
+        ([[[7 - i % 2, 5] for i in range(n)] for n in (8, 9)], False),
     ],
 )
-def test_a_long_table_that_contradicts_itself_is_refused(
-    folder,
-    refused,
-    table,
-    sentence,
+def test_a_column_without_a_name_that_may_be_no_taxel_is_asked_for(
+    folder, refused, contents, is_asked
 ):
-    assert sentence in refused("csv", put(folder, {"all.csv": table}))
+    files = {
+        f"{i}.txt": text(pd.DataFrame(trial), header=False)
+        for i, trial in enumerate(contents)
+    }
+    put(folder, files)
+    if is_asked:
+        assert "column 2" in refused("csv", folder, *RATE)
+    else:
+        assert imported(folder, *RATE)[1]["0"].frames.shape == (8, 1, 2)
+
+
+def test_missing_values_are_not_valid_and_said(folder, capsys):
+    put(folder, {"cup_1.csv": "t,p1,p2\n0,1,2\n0.1,,2\n0.2,65535,-1\n"})
+    words = ["--missing", "65535", "--missing", "-1"]
+    _, recordings = imported(folder, *words)
+    assert recordings["cup_1"].valid[:, 0].tolist() == [
+        [True, True],
+        [False, True],
+        [False, False],
+    ]
+    assert "missing: 3 values" in capsys.readouterr().out
+
+
+def test_joint_angles_in_rows_of_their_own_are_interpolated(folder, capsys):
+    content = "time_s,s1,s2,q\n0.0,,,0.0\n0.1,1,2,\n0.2,,,0.2\n0.9,3,4,\n"
+    put(folder, {"cup_1.csv": content})
+    _, recordings = imported(folder, "--taxels", "s1,s2", "--joints", "q")
+    assert flat(recordings["cup_1"]) == [[1, 2], [3, 4]]
+    np.testing.assert_allclose(recordings["cup_1"].joints, [[0.1], [np.nan]])
+    assert "1 of 2 frames" in capsys.readouterr().out
+
+
+def test_joints_and_files_beside(folder):
+    files = {
+        "a.csv": "left,right,q.1,q.2\n0,nan,90,-90\n0.5,nan,90,-90\n",
+        "labels.csv": "\ufefftrial,object,who\na,bear,me\n",
+        "skin.json": '{"rows": 2, "cols": 1, "threshold_counts": 3}',
+    }
+    put(folder, files)
+    words = ["--joints", "q", "--degrees", "--scale", "10", "--taxels", "left,right"]
+    _, recordings = imported(folder, *RATE, *words)
+    trial = recordings["a"]
+    assert trial.frames[:, :, 0].tolist() == [[0, 0], [5, 0]]
+    assert trial.valid[:, :, 0].tolist() == [[True, False]] * 2
+    assert trial.joints == pytest.approx(np.radians([[90, -90]] * 2))
+    assert trial.labels == {"object": "bear", "who": "me"}
+    assert trial.layout.threshold_counts == 3
 
 
 def test_labels_and_the_names_of_trials_stand_as_they_are(folder):
-    labels = {"007": "None", "7": "NA", "8": "cup"}
-    rows = [(trial, label, t, t) for trial, label in labels.items() for t in (0, 1)]
-    put(folder, {"all.csv": text(rows, head="trial,object,t,p1")})
-    _, recordings = imported(folder, "--time-unit", "s")
-    assert {
-        name: trial.labels["object"] for name, trial in recordings.items()
-    } == labels
+    lines = [
+        f"{trial},2024-02-01T00:00,at {i},2024-03-01T10:00:00.{i},{i}"
+        for trial in ("007,None", "7,NA", "8,cup")
+        for i in range(3)
+    ]
+    put(folder, {"all.csv": "\n".join(["trial,object,made,phase,when,p1", *lines])})
+    _, recordings = imported(folder)
+    objects = {name: trial.labels["object"] for name, trial in recordings.items()}
+    assert objects == {"007": "None", "7": "NA", "8": "cup"}
+    assert recordings["7"].labels["made"] == "2024-02-01T00:00"
+    assert recordings["7"].t == pytest.approx([0.0, 0.1, 0.2])
 
 
-def test_angles_beyond_a_turn_are_degrees_or_a_mistake(folder, refused):
-    put(folder, {"cup_1.csv": "t,s1,q\n0,1,90\n0.1,2,91\n"})
-    words = ("--taxels", "s1", "--joints", "q")
-    assert "--degrees" in refused("csv", folder, *words)
-    _, recordings = imported(folder, *words, "--degrees")
-    assert recordings["cup_1"].joints[0, 0] == pytest.approx(np.pi / 2)
+def test_trials_and_labels_in_arrays_and_parquet_are_texts(folder):
+    pytest.importorskip("pyarrow")
+    content = [["a", "1", t, t] for t in (0, 10)] + [["b", None, t, t] for t in (0, 10)]
+    frames = pd.DataFrame(content, columns=["trial", "softness", "t", "p1"])
+    frames.astype({"softness": "category"}).to_parquet(folder / "all.parquet")
+    _, recordings = imported(folder)
+    assert recordings["a"].labels == {"softness": "1"}
+    assert recordings["b"].labels == {}
+    numbers = np.array([[0.0], [0.0], [7.0]])
+    savemat(folder / "x.mat", {"trial": numbers, "t": numbers.T % 7, "p1": numbers})
+    (folder / "all.parquet").unlink()
+    _, recordings = imported(folder, "--rate", "1")
+    assert len(recordings["0.0"].t) == 2
 
 
 def test_onsets_from_outside_are_kept(folder):
-    put(folder, {"cup_1.csv": "t,s1,grip\n0,1,0\n0.1,2,0\n0.2,2,1\n0.3,2,1\n"})
+    put(folder, {"cup_1.csv": "t,s1,grip\n0,1,0\n0.1,2,1\n0.2,2,1\n0.3,2,0\n0.4,2,1\n"})
     _, recordings = imported(folder, "--onset-column", "grip")
     onset = recordings["cup_1"].meta["onset"]
-    assert onset == {"source": "event", "times_s": [pytest.approx(0.2)]}
+    assert onset == {
+        "source": "event",
+        "times_s": [pytest.approx(0.1), pytest.approx(0.4)],
+    }
     _, recordings = imported(folder, "--onset", "first")
     assert recordings["cup_1"].meta["onset"] == {"source": "first", "times_s": [0.0]}

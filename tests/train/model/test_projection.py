@@ -180,3 +180,25 @@ def test_discriminants_without_labels_or_shrinkage_and_unknown_projections_are_r
 def test_a_large_offset_adds_no_component():
     X = np.random.default_rng(1).normal(size=(12, 120))
     assert len(principal_axes(X + 1e9)[1]) == 11
+
+
+def rows_of(shape, values, rng):
+    """Centred rows with these singular values."""
+    axes = np.linalg.qr(rng.normal(size=(shape[0], len(values))))[0]
+    axes = np.linalg.qr(axes - axes.mean(axis=0))[0]
+    return axes * values @ np.linalg.qr(rng.normal(size=(shape[1], len(values))))[0].T
+
+
+@pytest.mark.parametrize("shape", [(60, 24), (24, 60)])
+@pytest.mark.parametrize("decades", [3.9, 15])
+def test_leading_axes_are_those_of_the_full_decomposition(shape, decades):
+    """Below 1e-4 of the largest singular value the covariance is not trusted any
+    more."""
+    side = min(shape)
+    X = rows_of(shape, 10.0 ** -np.linspace(0, decades, side), np.random.default_rng(5))
+    ours = Spectrum(X).leading(side - 2)
+    _, exact, _ = principal_axes(X)
+    assert len(ours) == min(side - 2, len(exact))
+    signs = np.sign((ours @ exact.T).diagonal())[:, None]
+    assert np.abs(ours - signs * exact[: len(ours)]).max() < 1e-7
+    assert np.abs(ours @ ours.T - np.eye(len(ours))).max() < 1e-7

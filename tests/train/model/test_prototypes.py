@@ -26,6 +26,12 @@ def touches(n):
     return Vectors(X, y), place
 
 
+def parts(vectors, count):
+    """The prototypes of trials at one decision point."""
+    at_points = Vectors(vectors.X[None], vectors.y)
+    return divided(at_points, slice(None), [CHOICES], count, [{}])
+
+
 @pytest.fixture(scope="module")
 def model():
     """A model with two prototypes of each thing, and its trials."""
@@ -45,7 +51,7 @@ def test_few_trials_are_rows_themselves():
 
 def test_a_prototype_is_the_mean_of_trials_with_the_same_labels():
     vectors, place = touches(80)
-    of_trials = divided(vectors, CHOICES, 2, {})
+    of_trials = parts(vectors, 2)
     pairs = set(zip(of_trials.tolist(), place.tolist(), strict=True))
     assert len(pairs) == 8
     vectors = Vectors(vectors.X, vectors.y, prototypes=of_trials)
@@ -64,7 +70,7 @@ def test_a_prototype_is_the_mean_of_trials_with_the_same_labels():
 def test_equal_trials_make_one_prototype():
     vectors, _ = touches(40)
     vectors.X[:] = vectors.X[np.arange(40) % 4]
-    assert sorted(set(divided(vectors, CHOICES, 3, {}).tolist())) == [0, 1, 2, 3]
+    assert sorted(set(parts(vectors, 3).tolist())) == [0, 1, 2, 3]
 
 
 def test_the_file_answers_as_the_prototypes_do(model):

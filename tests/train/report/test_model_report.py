@@ -29,6 +29,8 @@ def written(recordings, tmp_path_factory):
                 trial, meta={**trial.meta, "labels": {"category": "soft-fixed"}}
             )
         trial.meta["labels"] = {"category": trial.labels["category"]}
+        trial.meta["robot"] = "left" if path.stem == "hard_1" else "right"
+        trial.meta["kept"] = "2026-11-28T23:59:00+00:00"
         if path.stem == "hard_7":
             trial = replace(trial, frames=0 * trial.frames)
         save(folder / path.name, trial)
@@ -46,6 +48,17 @@ def written(recordings, tmp_path_factory):
 
 def table(page, name):
     return rows_of(page.parent / f"{name}.csv")
+
+
+def test_trials_are_counted_by_label_robot_and_day(written):
+    rows = table(written[1], "recordings")
+    assert [tuple(row.values()) for row in rows] == [
+        ("category", "rigid-fixed", "6"),
+        ("category", "soft-fixed", "9"),
+        ("day", "2026-11-28", "15"),
+        ("robot", "left", "1"),
+        ("robot", "right", "14"),
+    ]
 
 
 def test_the_answers_are_those_that_the_nested_accuracy_counts(written):

@@ -101,24 +101,6 @@ class TestToppling:
         assert fallen.any()
         assert (slide[np.argmax(fallen) :] == lies).all()
 
-    def test_beyond_its_balance_it_falls_as_a_pendulum_does(self, batch):
-        # s'' = k (s - travel) / m about the balance: m v^2 - k (s - travel)^2 stays as
-        # it is.
-        state = batch.trials.states["tipping"]
-        mover = batch.trials.states["sliding"]
-        travel = state.travel[0]
-        lies = mover.lies[0]
-        slide = batch.traces["slide_m"][0]
-        force = batch.force[0]
-        speed = np.gradient(slide, batch.t)
-        free = (slide > 1.2 * travel) & (slide < 0.8 * lies) & (force == 0.0)
-        free[1:-1] &= (force[:-2] == 0.0) & (force[2:] == 0.0)
-        assert free.sum() >= 5
-        stiffness = state.force[0] / travel
-        energy = mover.inertia[0] * speed**2 - stiffness * (slide - travel) ** 2
-        scale = (mover.inertia[0] * speed**2)[free].max()
-        assert np.ptp(energy[free]) < 0.03 * scale
-
 
 def test_what_slides_at_the_skin_bears_force_at_every_step_of_a_frame():
     """Were the contact located once a frame, it would jump there, and the skin's loss

@@ -5,7 +5,7 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
-from numpy.testing import assert_allclose, assert_array_equal
+from numpy.testing import assert_allclose
 from scipy.linalg import solve, toeplitz
 
 from tests.train.simulate.scenes import Law, Rig, make, one_object, press, run
@@ -94,22 +94,6 @@ class TestAskew:
     """Over the end of a foam block of 8 kPa, 0.1 m thick, against an elastic block of
     that size by finite elements (linear bricks of 8 mm, bonded behind, no friction,
     Poisson's ratio 0.1)."""
-
-    def test_a_face_that_goes_on_beyond_the_skin_has_no_end_there(self):
-        rising = np.arange(4.0)
-        falling = -np.arange(4.0)
-        covered = np.ones(4)
-        begins = np.array([0.0, 1, 1, 1])
-        ends = np.array([1.0, 1, 1, 0])
-
-        def askew(depth, weight):
-            return lateral.askew(depth[:, None], weight[:, None], 0.5)[:, 0].tolist()
-
-        assert askew(rising, covered) == askew(falling, covered) == [0.0] * 4
-        assert askew(rising, begins) == [0.0] * 4
-        assert askew(falling, begins) == [0.0, 2.0, 0.0, 0.0]
-        assert askew(rising, ends) == [0.0, 0.0, 2.0, 0.0]
-        assert askew(falling, ends) == [0.0] * 4
 
     def test_rows_bear_the_loads_of_an_elastic_block(self):
         """At 17 degrees, 25.5 mm deep."""
@@ -266,16 +250,6 @@ def test_a_stem_that_is_struck_takes_its_momentum_on_average():
     part = impulse / (1e-3 * speed)
     assert "strike" in batch.trials.plan.calls
     assert part.mean() == pytest.approx(1.0, abs=0.1)
-
-
-def test_no_row_that_the_face_does_not_cover_is_the_deepest():
-    keys = {"family": "bubbles", "pop_n": 1e6, "bubble_n_m": 300.0, "bubble_m": 0.05}
-    batch = press("tilt", width_m=0.02, **keys)
-    covered = batch.trials.bed.weight > 0.0
-    depth = batch.trials.touch.line_depth
-    want = np.where(covered, depth, 0.0).max(axis=0)
-    assert (want < depth.max(axis=0)).all()
-    assert_array_equal(batch.traces["depth_m"][:, -1], want)
 
 
 def loads_of(t):

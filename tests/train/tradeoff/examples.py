@@ -34,7 +34,7 @@ def rule(error=0.1, right=95, mean_s=0.5, unseen=None):
     def hits(count):
         return None if count is None else np.arange(100) < count
 
-    return EarlyDecisions(error, mean_s, hits(right), hits(right), hits(unseen))
+    return EarlyDecisions(error, mean_s, hits(right), hits(unseen))
 
 
 def measured(points, certified, **changes):

@@ -127,10 +127,10 @@ def image(t: Trials) -> None:
     rows, window, _ = t.touch.image.shape
     image = np.zeros((rows * window, len(t)))
     part = stems.part
-    every = np.arange(len(t))
+    trials = np.arange(len(t))
     beside = window if rows > 1 else 0
     shares = zip(stems.taxel, loads * (1.0 - part), loads * part, strict=True)
     for taxel, first, second in shares:
-        image[taxel, every] += first
-        image[taxel + beside, every] += second
+        image[taxel, trials] += first
+        image[taxel + beside, trials] += second
     t.touch.image = image.reshape(rows, window, -1)

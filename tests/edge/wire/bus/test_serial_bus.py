@@ -45,6 +45,11 @@ def test_a_packet_has_no_zero_but_at_its_end_and_is_read_back(data):
     assert decode(packet[:-1]) == data
 
 
+@pytest.mark.parametrize("packet", ["0511", "021100"])
+def test_a_packet_that_was_cut_or_holds_a_zero_has_no_data(packet):
+    assert decode(bytes.fromhex(packet)) is None
+
+
 @pytest.mark.parametrize(
     ("data", "packet"),
     [

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from edge.wire.skin.decoder import HELD_S, Baseline
+from edge.wire.skin.decoder import HELD_S, SCALE_BITS, Baseline
 from edge.wire.skin.file import Signal
 
 EVERY = np.ones(3, dtype=bool)
@@ -64,6 +64,20 @@ def test_half_a_count_is_rounded_up():
         following.follow(raw(3000, 0, 1000), EVERY)
         eighths = (8000 + step, 8000 - step, 8000)
         assert following.counts.tolist() == [(n + 4) // 8 for n in eighths]
+
+
+def test_it_follows_a_quarter_of_the_error_rounded_to_the_nearest():
+    """Python's whole numbers are the oracle, of 1/4096 count."""
+    raws = range(1001, 1501)
+    following = baseline([1000] * 500, step_counts=500.0, limit=500)
+    nows = [1000 << SCALE_BITS] * 500
+    for _ in range(20):
+        following.follow(raw(*raws), np.ones(500, dtype=bool))
+        nows = [
+            n + ((r << SCALE_BITS) - n + 2 >> 2)
+            for n, r in zip(nows, raws, strict=True)
+        ]
+        assert following.counts.tolist() == [(n + 2048) // 4096 for n in nows]
 
 
 def test_noise_does_not_carry_it_away():

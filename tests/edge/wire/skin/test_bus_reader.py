@@ -24,9 +24,11 @@ from tests.checks.faults import (
     SHARES,
     SKINS,
     Pattern,
+    Watched,
     run,
     scripts,
     share,
+    spared,
     sweep,
 )
 from tests.faulty import Fault, faulty_buses, faulty_skin, one_bus
@@ -230,7 +232,27 @@ def test_faults_of_one_in_five_cost_few_frames(kind):
 
 def test_a_chip_that_hangs_costs_the_others_few_frames():
     kind = "timeouts of one AD7147"
-    assert share(kind, 1.0, seconds=4.0).beside >= LEAST_BESIDE
+    assert share(kind, 1.0, seconds=2.0).beside >= LEAST_BESIDE
+
+
+def hanging(number, **more):
+    """A hang of a chip of the first bus."""
+    place = {k: getattr(SMALL.chips[number], k) for k in ("address", "mux", "channel")}
+    return Fault(code=errno.ETIMEDOUT, bus="/dev/i2c-1", **place, **more)
+
+
+def test_two_chips_that_hang_in_different_frames_take_no_other_chip_down():
+    hangs = [hanging(0, during=(0.1, 0.11)), hanging(1, during=(0.6, 0.61))]
+    assert run("", SMALL, hangs, seconds=1.0).elsewhere == 0
+
+
+def test_two_chips_that_hang_at_the_start_take_no_other_chip_down():
+    hangs = [hanging(2), hanging(3)]
+    watched = Watched(SMALL, faults=hangs)
+    watched.spared = spared(SMALL, hangs)
+    with watched.skin:
+        watched.read()
+    assert watched.elsewhere == 0
 
 
 def test_a_bus_that_hangs_is_tried_seldom_and_is_back_soon_after():

@@ -13,6 +13,7 @@ from edge.wire.chips.block import UNCHANGED_FRAMES
 from edge.wire.fake.clock import VirtualClock
 from edge.wire.fake.player import calibrated, fake_buses, fake_skin, frame_bits, still
 from edge.wire.skin import file as skinfile
+from edge.wire.skin.decoder import HELD_S
 from edge.wire.skin.file import Reading
 from edge.wire.skin.loop import Loop
 from edge.wire.skin.skin import SILENT_FRAMES, Skin
@@ -165,12 +166,14 @@ def test_taxels_that_fall_silent_are_heard_of_and_so_is_their_return():
 
 
 def test_a_skin_without_calibration_follows_no_drift():
+    """Not even what is held for ten windows."""
+    file = replace(CHIP, calibration=None)
     clock = VirtualClock()
-    buses = fake_buses(CODY, lambda t: PICTURE, clock)
-    with Skin(CODY, buses, clock=clock) as skin:
+    buses = fake_buses(file, lambda t: PICTURE, clock)
+    with Skin(file, buses, clock=clock) as skin:
         skin.start()
         before = skin.baseline.counts
-        frames = list(Loop(skin, lasts_s=1.0).frames())
+        frames = list(Loop(skin, lasts_s=HELD_S + 1.0).frames())
         raw, valid = skin.raw()
     np.testing.assert_array_equal(skin.baseline.counts, before)
     np.testing.assert_array_equal(frames[-1].counts, raw * valid)
