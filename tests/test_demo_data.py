@@ -16,11 +16,7 @@ def test_the_demo_touches_one_of_each_category_and_gets_them_right(edge):
     assert status == 0
     decided = {line["label"] for line in lines if line.get("task") == "category"}
     assert decided == {"rigid-fixed", "rigid-movable", "soft-fixed", "soft-movable"}
-    assert all(
-        line["label"] == line["expected"]
-        for line in lines
-        if line["event"] == "decision"
-    )
+    assert all(line.get("label") == line.get("expected") for line in lines)
 
 
 def test_a_wrong_decision_is_a_failure(monkeypatch, tmp_path, edge):

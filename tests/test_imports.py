@@ -9,6 +9,7 @@ import pytest
 
 from tests.conftest import ROOT, python
 
+PACKAGES = ["edge", "train", "export"]
 BOARD = {"numpy", "onnxruntime", "smbus2", "edge"}
 OPTIONAL = {"serial": "edge/wire/bus/serial_bus.py", "argcomplete": "edge/app/cli.py"}
 """The packages of the wheel's extras, and the only module that may import each."""
@@ -66,13 +67,12 @@ def test_an_optional_dependency_is_imported_only_where_it_is_used(name):
     assert loaded <= inside
 
 
-@pytest.mark.parametrize("package", ["edge", "train", "export"])
+@pytest.mark.parametrize("package", PACKAGES)
 def test_nothing_pickles(package):
     for path in modules(package):
         assert not imported(path) & FORBIDDEN, path
 
 
-PACKAGES = ["edge", "train", "export"]
 ROOMS = ("wire", "touch", "features", "record", "decide", "app")
 FRAME = [f"edge.{room}" for room in ROOMS]
 """The way of one frame through `edge/`."""
@@ -151,7 +151,7 @@ def test_only_the_top_floor_knows_commands():
 def test_no_modules_import_each_other_in_a_circle():
     paths = {
         ".".join(path.relative_to(ROOT).with_suffix("").parts): path
-        for package in ("edge", "train", "export")
+        for package in PACKAGES
         for path in modules(package)
         if path.name != "__init__.py"
     }

@@ -29,16 +29,13 @@ def test_a_dry_run_says_what_it_would_do_with_data_that_are_not_there_yet():
     assert "--data later kept" in result.stdout
 
 
-def test_a_front_that_was_never_measured_is_named(tmp_path):
+def test_a_front_of_its_own_folder_comes_first_and_must_have_been_measured(tmp_path):
     words = ("export", f"DATA={tmp_path}", f"OUT={tmp_path}", "FRONT=fast")
     result = make(*words, cwd=tmp_path)  # where no earlier run has left a front
     assert result.returncode == 2
     assert "FRONT needs the points of `make tradeoff`" in result.stderr
-
-
-def test_a_front_of_its_own_folder_comes_first(tmp_path):
     (tmp_path / "tradeoff").mkdir()
     (tmp_path / "tradeoff" / "front.json").write_text("{}")
-    result = make("-n", "export", f"DATA={tmp_path}", f"OUT={tmp_path}", "FRONT=fast")
+    result = make("-n", *words)
     assert result.returncode == 0
     assert f"--front fast --fronts {tmp_path}/tradeoff/front.json" in result.stdout

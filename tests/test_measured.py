@@ -47,17 +47,11 @@ def test_each_figure_is_measured_or_computed(page):
 
 @pytest.mark.parametrize("name", TABLES)
 def test_each_table_names_its_command_commit_machine_and_date(name):
+    """The commit without local changes: otherwise nobody can say what was measured."""
     head = TABLES[name].splitlines()[0]
-    assert re.fullmatch(
-        r"\*`(make|python|edge-classify).*`, commit .+, .+ cores, \d{4}-\d\d-\d\d\*",
-        head,
-    )
-
-
-@pytest.mark.parametrize("name", TABLES)
-def test_each_table_was_measured_at_a_commit_without_local_changes(name):
-    """Otherwise nobody can say what was measured: commit, then `make check`."""
-    assert "-dirty" not in TABLES[name].splitlines()[0]
+    command = r"`(make|python|edge-classify).*`"
+    assert re.fullmatch(rf"\*{command}, commit .+, .+ cores, \d{{4}}-\d\d-\d\d\*", head)
+    assert "-dirty" not in head
 
 
 def test_each_table_is_on_a_page_and_each_link_has_its_table():

@@ -1,24 +1,33 @@
-"""Tests mirror the modules: each has a test file of its name, is imported by one, or is
-listed."""
+"""Tests mirror the modules, in their room and name: each has a test file of its name, is
+imported by a test of its room, or stands in a list with the test that specifies it."""
 
 import re
-from pathlib import Path
 
-ROOT = Path(__file__).parents[1]
+from tests.conftest import ROOT
+
 THROUGH = {
+    "edge/app/commands/demo.py": "test_demo_data.py",
+    "edge/decide/summary.py": "edge/app/commands/test_replay_verify.py",
+    "edge/touch/contact.py": "edge/touch/test_track.py",
+    "edge/touch/frame.py": "edge/touch/test_track.py",
     "train/study": "train/study/test_study_report.py",
     "train/tradeoff": "train/tradeoff/test_tradeoff.py",
+    "train/commands/show.py": "train/test_draw.py",
+    "train/commands/simulate.py": "train/simulate/test_simulate_run.py",
+    "train/commands/study.py": "train/study/test_study_report.py",
     "train/commands/tradeoff.py": "train/tradeoff/test_tradeoff.py",
     "train/report/options.py": "train/study/test_study_report.py",
     "train/report/work.py": "train/study/test_study_report.py",
     "train/fitted.py": "train/test_fitting.py",
     "train/data/contacts.py": "train/data/test_dataset.py",
+    "train/data/vectors.py": "train/choose/test_choose.py",
     "train/importers/rosbag.py": "train/importers/test_log_importers.py",
     "train/importers/topics.py": "train/importers/test_log_importers.py",
     "train/importers/table.py": "train/importers/forms/test_text.py",
     "train/importers/forms": "train/importers/forms/test_forms.py",
     "train/simulate/families.py": "train/simulate/test_simulate_scene.py",
     "train/simulate/groups.py": "train/simulate/test_effects.py",
+    "train/simulate/trials.py": "train/simulate/test_effects.py",
     "train/simulate/truth.py": "train/simulate/test_simulate_truth.py",
 }
 """{module or folder: the test file that specifies it with others}."""
@@ -30,19 +39,16 @@ MODULES = [
 ]
 TESTS = {
     path.relative_to(ROOT / "tests").as_posix(): path.read_text()
-    for path in sorted((ROOT / "tests").rglob("*.py"))
-    if path != Path(__file__)
+    for path in sorted((ROOT / "tests").rglob("test_*.py"))
 }
 
 
 def specified(module):
-    """Whether a test file has its name, specifies it with others, imports it or runs it.
-    A module that defines nothing but names needs none."""
+    """Whether a module has a test; one that defines nothing but names needs none."""
     if not re.search(r"^\s*(def|class) ", (ROOT / module).read_text(), re.M):
         return True
-    if (module.parent / f"test_{module.name}").as_posix() in TESTS:
-        return True
-    if {THROUGH.get(part.as_posix()) for part in (module, module.parent)} & set(TESTS):
+    listed = {THROUGH.get(part.as_posix()) for part in (module, module.parent)}
+    if {(module.parent / f"test_{module.name}").as_posix(), *listed} & set(TESTS):
         return True
     package = ".".join(module.parent.parts)
     name = module.stem
@@ -51,9 +57,13 @@ def specified(module):
         imported += rf"|main\(\[\"{name.strip('_')}\"|run\(\"{name}\"|edge\(\"{name}\""
     if module.parent.name == "effects":
         imported += rf"|\"{name}\"|\b{name}="
-    return any(re.search(imported, text) for text in TESTS.values())
+    room = "/".join(module.parent.parts[:2])
+    of_room = (text for path, text in TESTS.items() if path.startswith(room))
+    return any(re.search(imported, text) for text in of_room)
 
 
 def test_every_module_is_specified_by_a_test():
     without = [module.as_posix() for module in MODULES if not specified(module)]
     assert without == [], "give each a test file of its name"
+    modules = {part.as_posix() for path in MODULES for part in (path, path.parent)}
+    assert THROUGH.keys() - modules == set(), "leave out what is gone"

@@ -16,7 +16,6 @@ from tests.checks.bench.program import start
 from tests.checks.bench.scale import rows_of
 from tests.checks.hard_cases import __main__ as hard_cases
 from tests.checks.hard_cases import elsewhere
-from tests.checks.other_skins import SKINS, touch
 from tests.conftest import ROOT
 
 
@@ -80,16 +79,6 @@ def test_a_table_has_its_command_as_it_can_be_run_and_no_empty_part(
         "*`python -m tests.checks.bench.soak --data 'two words'`, commit "
     )
     assert lines == ["", "| a | b |", "| --- | --- |", "| 1 | x |", "| 2 | y |"]
-
-
-def test_other_skins_have_their_traits():
-    hand, glove, force_glove, *_ = SKINS.values()
-    grip = touch(hand, 3, 1)
-    assert grip.shear.shape == (50, 3, 4, 2)
-    assert grip.joints.shape == (50, 7)
-    assert touch(glove, 3, 1).frames[0].max() > 60
-    loads = touch(force_glove, 3, 0).frames[60:].sum(axis=(1, 2))
-    assert loads.max() > 10 * loads.min()
 
 
 STEP = """

@@ -39,23 +39,11 @@ def core(tmp_path_factory):
     ]
 
 
-def test_a_run_reads_the_skin_and_decides_with_a_model(core):
-    modules = (
-        "edge/wire/bus/linux.py",
-        "edge/wire/chips/ad7147.py",
-        "edge/decide/engines.py",
-    )
-    assert set(modules) <= set(core)
-
-
-def test_the_core_loads_neither_tools_nor_fakes(core):
-    assert core
-    beside = [
-        path
-        for path in core
-        if path.startswith(("edge/wire/fake/", "edge/app/sinks/page"))
-    ]
-    assert beside == []
+def test_a_run_reads_the_skin_and_decides_with_a_model_without_tools_and_fakes(core):
+    modules = {"edge/wire/bus/linux.py", "edge/wire/chips/ad7147.py"}
+    assert modules | {"edge/decide/engines.py"} <= set(core)
+    beside = ("edge/wire/fake/", "edge/app/sinks/page")
+    assert not any(path.startswith(beside) for path in core)
 
 
 @pytest.mark.parametrize("path", OPTIONAL)

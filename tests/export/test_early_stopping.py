@@ -14,7 +14,7 @@ from edge.decide.classifier import Classifier
 from edge.decide.early import fastest, stopping_rules
 from edge.decide.events import Decided
 from edge.decide.model import Model
-from edge.decide.verify import first_series, verify
+from edge.decide.verify import first_series
 from edge.errors import InputError
 from edge.features.vector import FEATURES
 from edge.record.saving import save
@@ -87,20 +87,8 @@ def test_a_far_feature_matters_only_where_a_decision_point_takes_it(
     assert outside == [[0.0], [0.0], [1.0]]
 
 
-def test_the_golden_file_holds_what_is_answered_at_each_decision_point(early, folder):
-    golden = np.load(folder / "out" / "golden.npz")
-    assert all(check.passed for check in verify(early, folder / "out" / "golden.npz"))
-    for point, vectors in enumerate(golden["decision_point_vectors"]):
-        answers = early.run(vectors, point)
-        for task in early.info.tasks:
-            stored = golden[f"decision_point_{task}_distances"][point]
-            np.testing.assert_array_equal(stored, answers[f"{task}_distances"])
-
-
 def test_a_stream_that_ends_before_any_rule_is_sure_is_decided_at_its_end(
-    early,
-    make_touch,
-    error,
+    early, make_touch, error
 ):
     events = decided(early, make_touch(kind="soft", seed=50, seconds=0.25), error)
     assert list(events) == list(early.info.tasks)
@@ -166,22 +154,19 @@ def strange(make_touch):
     return replace(ordinary, frames=np.minimum(ordinary.frames.astype(int) * 40, 65535))
 
 
-def stops_of(events):
-    """The windows of decisions, and whether they are flagged as unusual."""
-    return {(event.window_s, "unusual" in event.flags) for event in events.values()}
-
-
-def test_a_touch_like_others_does_not_wait(hasty, make_touch):
+def test_a_touch_unlike_all_others_waits_and_is_flagged_as_unusual(
+    hasty, make_touch, strange
+):
     model, error = hasty
-    events = decided(model, make_touch(kind="hard", seed=50), error)
-    assert stops_of(events) == {(0.3, False)}
-    assert {event.stopped_by for event in events.values()} == {"confidence"}
-
-
-def test_a_touch_unlike_all_others_waits_and_is_flagged(hasty, strange):
-    model, error = hasty
-    assert stops_of(decided(model, strange, error)) == {(1.2, True)}
-    assert stops_of(decided(model, strange, None)) == {(1.2, True)}
+    ordinary = make_touch(kind="hard", seed=50)
+    for touch, rate, stop in (
+        (ordinary, error, (0.3, "confidence", False)),
+        (strange, error, (1.2, "confidence", True)),
+        (strange, None, (1.2, None, True)),
+    ):
+        for event in decided(model, touch, rate).values():
+            flagged = "unusual" in event.flags
+            assert (event.window_s, event.stopped_by, flagged) == stop
 
 
 @pytest.mark.parametrize("early_ones", [True, False])
@@ -210,24 +195,18 @@ def test_an_error_that_no_task_certifies_is_refused_with_what_would_do(early):
         Classifier(early, error=0.001)
 
 
+@pytest.mark.parametrize("level", ["ORT_DISABLE_ALL", "ORT_ENABLE_ALL"])
 def test_a_stranger_with_onnxruntime_alone_is_answered_at_the_full_window(
-    early, folder
+    early, folder, level
 ):
-    """At every level of optimisation: the default is no constant to be folded."""
+    """The default is no constant to be folded."""
     X = load_trials([folder / "data"]).features(early.info.window_s)
-    expected = early.run(X)
     data = Path(early.path).read_bytes()
-    for level in (
-        GraphOptimizationLevel.ORT_DISABLE_ALL,
-        GraphOptimizationLevel.ORT_ENABLE_ALL,
-    ):
-        runtime = session(data, level)
-        names = [output.name for output in runtime.get_outputs()]
-        outputs = runtime.run(names, {"features": X})
-        assert [v.tolist() for v in outputs] == [
-            expected[name].tolist() for name in names
-        ]
-        assert set(names) == set(expected)
+    runtime = session(data, getattr(GraphOptimizationLevel, level))
+    names = [output.name for output in runtime.get_outputs()]
+    outputs = zip(names, runtime.run(names, {"features": X}), strict=True)
+    expected = {name: values.tolist() for name, values in early.run(X).items()}
+    assert {name: values.tolist() for name, values in outputs} == expected
 
 
 def pressed(make_touch, seeds):

