@@ -60,7 +60,7 @@ def hard_set(kind, rng):
     elif kind == "dominated":
         X[:, :8] = np.rint(2.0 * rng.random((n, 8))) * 1e12 * np.abs(X).max()
     elif kind == "denormal":
-        X[:, :8] = rng.integers(0, 50, (n, 8)) * 5e-324
+        X[:, ::3] = rng.integers(0, 50, (n, 8)) * 5e-324
     elif kind == "far":
         queries *= 10.0 ** rng.uniform(0, 140, (8, 1))
     return X, np.concatenate([X[:2], queries])
