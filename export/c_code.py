@@ -550,6 +550,8 @@ def lacks(info: ModelInfo) -> Iterable[str]:
     layout = info.layout
     if layout.axes:
         yield "it takes no shear"
+    if info.scorer != "knn":
+        yield f"its scorer is {info.scorer}"
     if info.onset:
         yield "it finds the onset of a touch by the skin alone"
     total = layout.rows * layout.cols * 65535
