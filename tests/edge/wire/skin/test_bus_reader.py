@@ -148,6 +148,13 @@ def test_the_next_frame_after_another_program_selected_channels_is_valid(
     assert Pattern(SMALL).wrong(frame) == 0
 
 
+def test_after_a_frame_each_selection_is_read_back_again(running):
+    skin, _, _ = running
+    skin.read()
+    for reader in skin.readers:
+        assert [mux.verify for mux in reader._muxes.values()] == [True]
+
+
 def test_a_damaged_stage_register_is_found_by_reading_the_stages_in_turn(running):
     """13 rows of 4 chips, one every 4 frames; the values meanwhile look plausible."""
     skin, model, slot = running
