@@ -14,7 +14,6 @@ from onnx.helper import make_empty_tensor_value_info
 
 from edge.arrays import Array, Floats, Integers
 from edge.decide.model import Model
-from edge.decide.onnx_file import Node
 from edge.errors import InputError
 from export.build import smallest
 
@@ -76,6 +75,21 @@ class Step(NamedTuple):
     sizes: Sequence[int]
 
 
+class Node(NamedTuple):
+    """A node of the graph."""
+
+    operator: str
+    inputs: list[str]
+    outputs: list[str]
+    attributes: dict[str, int]
+
+    @classmethod
+    def of(cls, node: onnx.NodeProto) -> Node:
+        """A node of a file."""
+        attributes = {a.name: a.i for a in node.attribute}
+        return cls(node.op_type, list(node.input), list(node.output), attributes)
+
+
 class CompiledGraph:
     """The steps, the tables and the arena of a model's outputs.
 
@@ -108,9 +122,8 @@ class CompiledGraph:
         self._of_means: dict[str, Array] = {}
         """{name of means: which features they are of}."""
         proto = onnx.load_from_string(model.contents.data)
-        self._makers = {
-            name: node for node in model.contents.nodes for name in node.outputs
-        }
+        nodes = list(map(Node.of, proto.graph.node))
+        self._makers = {name: node for node in nodes for name in node.outputs}
         del proto.graph.output[:]
         proto.graph.output.extend(map(make_empty_tensor_value_info, self._makers))
         options = onnxruntime.SessionOptions()
@@ -125,10 +138,10 @@ class CompiledGraph:
             results = dict(zip(self._makers, values, strict=True))
             self._values.append(model.contents.constants | inputs | results)
         self._variable = {"features"}
-        for node in model.contents.nodes:
+        for node in nodes:
             if not self._variable.isdisjoint(node.inputs):
                 self._variable.update(node.outputs)
-        nodes = self._needed(model.contents.nodes, outputs)
+        nodes = self._needed(nodes, outputs)
         nodes = self._needed([*self._fused(nodes), *nodes], outputs)
         self._place(nodes, outputs)
         self.steps = list(map(self._step, nodes))

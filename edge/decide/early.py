@@ -34,7 +34,7 @@ def policies(model: Model, error: float) -> Mapping[str, Policy]:
         if rule is None:
             policy_of[task] = Uncertified(model.info)
         else:
-            kind = Product if task in model.info.products else Early
+            kind = JointDecision if task in model.info.products else Early
             policy_of[task] = kind(model.info, task, rule, error)
     return policy_of
 
@@ -140,7 +140,7 @@ class Early:
         return answer.flagged(unsure=unsure, tie=False)
 
 
-class Product(Early):
+class JointDecision(Early):
     """Decide when both factors are, by their labels."""
 
     def answer(

@@ -150,8 +150,8 @@ def angles_at(
     across_s = joints_t[after] - joints_t[before]
     outside_s = np.maximum(joints_t[0] - t, t - joints_t[-1])
     # A clock counts in steps of its own; a gap is longer by more than rounding.
-    unknown = (across_s > gap_s * (1.0 + 1e-9)) | (outside_s > HOLD_S * (1.0 + 1e-9))
-    at_frames[unknown] = np.nan
+    is_gap = (across_s > gap_s * (1.0 + 1e-9)) | (outside_s > HOLD_S * (1.0 + 1e-9))
+    at_frames[is_gap] = np.nan
     return at_frames
 
 

@@ -4,6 +4,7 @@ left out."""
 import math
 import re
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import cache
 from itertools import pairwise
@@ -28,9 +29,9 @@ UNIT_NAMES = {
 UNITS = {name: unit for unit, names in UNIT_NAMES.items() for name in names.split()}
 TIME = re.compile(
     r"(?:(?:elapsed|relative|rel|system|sys|log|frame)[ _]*)?"
-    r"(?:ts|t|time|time_?stamp|stamp|clock|datetime)"
+    r"(?:ts|t|time|time_?stamp|stamp|clock|datetime|epoch|zeit|zeitstempel)"
     rf"(?:[ _]*[\[(]?(?P<unit>{'|'.join(UNITS)})[\])]?)?"
-    rf"|(?P<alone>{'|'.join(name for name in UNITS if len(name) > 4)})",
+    rf"|(?P<alone>{'|'.join(name for name in UNITS if len(name) > 1)})",
     re.IGNORECASE,
 )
 """Names of a column of times, with its unit if they tell it."""
@@ -40,9 +41,10 @@ MINUTES = r"(?<!:)\b(\d+:\d+[.,])"
 """How minutes and seconds with a fraction begin, as Excel writes them."""
 RUNNING = (
     r"\A(?P<stem>.*?)(?P<first>\d{1,9})"
-    r"(?:(?:[_x]|, ?|\]\[)(?P<second>\d{1,9}))?\]?\Z"
+    r"(?:(?:[_x]|, ?|\]\[)(?P<second>\d{1,9}))?\]?(?: ?[\[(][^\d\W]+[\])])?\Z"
 )
-"""A name with a number at its end, or with a row and a column: s1, s[1], s_1_2, s[1][2]."""
+"""A name with a number at its end, or with a row and a column: s1, s[1], s_1_2, s[1][2];
+a unit may stand behind it."""
 EPOCHS = {"ns": 9e17, "us": 9e14, "ms": 9e11, "s": 9e8}
 """The least time since 1970 in each unit that a log of today has."""
 LONGEST_STEP = 0.25
@@ -143,6 +145,21 @@ def _term(table: Table, term: str) -> list[str]:
     )
 
 
+def typed(table: Table, names: Sequence[str]) -> str:
+    """Some columns as an option takes them: a range where it gives them, and by their
+    places where a sign in their names means something else."""
+    columns_of_file = list(table.file_names) or table.names
+    terms = list(names)
+    if set(" ,;-()[]'\"") & set("".join(names)):
+        terms = [str(columns_of_file.index(name) + 1) for name in names]
+    if len(terms) > 1:
+        span = f"{terms[0]}-{terms[-1]}"
+        with suppress(InputError):
+            if columns(table, span) == list(names):
+                return span
+    return ",".join(terms)
+
+
 def column(table: Table, option: str, terms: str) -> str:
     """The column that an option names.
 
@@ -197,7 +214,11 @@ def _time_column(
     if times := named_times(table, joints):
         return times[0]
     numbers = table.data.select_dtypes("number")
-    rising = [name for name in numbers if (numbers[name].diff()[1:] > 0.0).all()]
+    rising = [
+        typed(table, [name])
+        for name in numbers
+        if (numbers[name].diff()[1:] > 0.0).all()
+    ]
     raise InputError(
         f"{table.where}: no column is called a time; give --rate HZ, such as --rate 100, "
         f"or --time {' or '.join(rising) or 'COL'}, among {short_text(table.names)}"
@@ -250,18 +271,20 @@ def _running(table: Table, rest: Sequence[str]) -> tuple[list[str], tuple[int, .
     if grids:
         spans = " or ".join(spanned(names) for names, _ in grids)
         raise InputError(
-            f"{table.where}: are the taxels {spans}? Name them by --taxels "
-            f"{grids[0][0][0]}-{grids[0][0][-1]}, and joint angles by --joints"
+            f"{table.where}: are the taxels {spans}? Give --taxels "
+            f"{typed(table, grids[0][0])}, and joint angles by --joints"
         )
-    three = ", or --axes xyz for taxels of three axes" * any(map(lettered, rest))
+    raise InputError(f"{table.where}: {_no_taxels(table, rest)}")
+
+
+def _no_taxels(table: Table, names: Sequence[str]) -> str:
+    """What to type where no columns are named as taxels."""
+    three = ", or --axes xyz for taxels of three axes" * any(map(lettered, names))
     numbers = table.data.select_dtypes("number").columns
-    names = [name for name in rest if name in numbers] or rest
-    if any(set(",;- ") & set(name) for name in names):
-        every = list(table.file_names) or table.names
-        names = [str(every.index(name) + 1) for name in names]
-    raise InputError(
-        f"{table.where}: no columns are named as taxels, such as s1 to s16 without a gap; "
-        f"give --taxels {','.join(names)}{three}, without what is no taxel"
+    terms = [name for name in names if name in numbers] or names
+    return (
+        "no columns are named as taxels, such as s1 to s16 without a gap; give --taxels "
+        f"{typed(table, terms)}{three}, without what is no taxel"
     )
 
 
@@ -295,9 +318,9 @@ def _unit(
     """The unit of times, and how it is known."""
     if time is None:
         return "s", "by --rate"
-    name = TIME.fullmatch(time)
-    stated = table.units.get(time) or (name and (name["unit"] or name["alone"]))
-    unit = options.time_unit or UNITS.get((stated or "").lower())
+    match = TIME.fullmatch(time)
+    words = filter(None, [table.units.get(time), *(match.groups() if match else [])])
+    unit = options.time_unit or UNITS.get(next(words, "").lower())
     if unit == "iso" or (unit is None and is_date(table, time)):
         return "iso", "times of the day"
     return (unit, "as said") if unit else _likely_unit(table, time)

@@ -226,11 +226,11 @@ def rest_of(trials: Sequence[Samples], options: ValueOptions) -> Rest:
         rest = _moved(trials, options)
     elif not (options.counts or codes):
         _require_rest_at_zero(trials)
-    refused = [trial for trial in trials if rest.counts(trial) is None]
-    if refused:
-        rest = replace(rest, lacking=_lacking(refused, rest, codes))
-    if 2 * len(refused) > len(trials):
-        raise rest.refusal(refused[0])
+    odd = [trial for trial in trials if rest.counts(trial) is None]
+    if odd:
+        rest = replace(rest, lacking=_lacking(odd, rest, codes))
+    if 2 * len(odd) > len(trials):
+        raise rest.refusal(odd[0])
     return rest
 
 
@@ -247,17 +247,19 @@ def _require_rest_at_zero(trials: Sequence[Samples]) -> None:
     ]
     if not starts:
         return
-    medians = pd.DataFrame([start.median() for start in starts])
+    frames = pd.concat(starts, keys=range(len(starts)))
+    by_trial = frames.groupby(level=0)
+    medians = by_trial.median()
     rest = medians.median()
     level = float(rest.median())
-    noise = pd.concat([(start - start.median()).abs() for start in starts]).median()
+    noise = (frames - by_trial.transform("median")).abs().median()
     drift = (medians - rest).abs().median()
     steady = (noise < NOISE * rest) & (drift < DRIFT * rest)
     base = rest.to_numpy()[:, None]
     rise = _highest(trial.values[..., :1] - base for trial in trials)
     fall = _highest(base - trial.values[..., :1] for trial in trials)
-    whole = all((start.dropna() % 1.0 == 0.0).all(axis=None) for start in starts)
-    least = LEAST_REST if whole else 0.0
+    is_whole = np.array_equal(frames, np.rint(frames), equal_nan=True)
+    least = LEAST_REST if is_whole else 0.0
     if steady.mean() < 0.5 or level <= max(least, max(rise, fall) / OFFSET):
         return
     option = "--falls" if fall > 2.0 * rise else "--signed"
@@ -342,11 +344,11 @@ def _quietest(trials: Sequence[Samples], options: ValueOptions) -> NDArray[np.fl
     normal = pd.DataFrame(starts[..., 0])
     usual = normal.median() if options.signed else normal.max()
     unrest = (normal - usual).abs().sum(axis=1)
-    unknown = ~np.isfinite(starts).all(axis=2)
-    first = np.lexsort([unrest, unknown.sum(axis=1)])[0]
-    lost = int(unknown[first].sum())
-    if lost:
-        say(f"{counted(lost, 'taxel')} without a value at rest, which is never valid")
+    lacks_value = ~np.isfinite(starts).all(axis=2)
+    first = np.lexsort([unrest, lacks_value.sum(axis=1)])[0]
+    count = int(lacks_value[first].sum())
+    if count:
+        say(f"{counted(count, 'taxel')} without a value at rest, which is never valid")
     return np.asarray(starts[first])
 
 

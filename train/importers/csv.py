@@ -108,14 +108,19 @@ def trials(
             say(line)
         return
     kind = mode(trial.meaning.kind for trial in measured)
-    for trial in measured:
+    yield from _odd(measured, kind)
+    alike = [trial for trial in measured if trial.meaning.kind == kind]
+    yield from _recorded(path, folder, arm, alike, options)
+
+
+def _odd(trials: Sequence[Measured], kind: str) -> Iterator[Refused]:
+    """Why trials whose columns are not those of most are left out."""
+    for trial in trials:
         if trial.meaning.kind != kind:
             yield Refused(
                 f"{trial.samples.where}: has {trial.meaning.kind:.80}, and most have "
                 f"{kind:.80}; see --taxels and --time-unit"
             )
-    usable = [trial for trial in measured if trial.meaning.kind == kind]
-    yield from _recorded(path, folder, arm, usable, options)
 
 
 def _tried(items: Iterator[Any]) -> Iterator[Any]:
@@ -225,74 +230,86 @@ def _with_joints(
     """The frames and their rows, with joint angles that may stand in rows of their
     own."""
     where = samples.where
-    known = np.isfinite(angles).all(axis=1)
-    if known.all() or not known.any():
+    has_angles = np.isfinite(angles).all(axis=1)
+    if has_angles.all() or not has_angles.any():
         return replace(samples, joints=clock.complete(angles, where)), rows
-    felt = np.isfinite(samples.values).any(axis=(1, 2))
-    t = samples.t[felt]
+    has_values = np.isfinite(samples.values).any(axis=(1, 2))
+    t = samples.t[has_values]
     frame = str(rows.name)
     at_frames = clock.angles_at(
-        t, samples.t[known], angles[known], RELEASE_S, where, frame, rows[known]
+        t,
+        samples.t[has_angles],
+        angles[has_angles],
+        RELEASE_S,
+        where,
+        frame,
+        rows[has_angles],
     )
     joints = clock.complete(at_frames, where)
-    return Samples(where, t, samples.values[felt], joints), rows[felt]
+    return Samples(where, t, samples.values[has_values], joints), rows[has_values]
 
 
 def _recorded(
     path: Path,
     folder: Path,
     arm: Chain | None,
-    usable: Sequence[Measured],
+    trials: Sequence[Measured],
     options: TableOptions,
 ) -> Iterator[Trial | Refused]:
     """The recordings of trials of the same columns; prints the columns used and
     ignored."""
-    others = [_name(place.relative_to(folder)) for place in folder.rglob("*")]
-    labels = labels_of([trial.place for trial in usable], folder, options, others)
+    names = [_name(place.relative_to(folder)) for place in folder.rglob("*")]
+    labels = labels_of([trial.place for trial in trials], folder, options, names)
     yield from map(Refused, labels.slips)
     skin = json_table(folder / SKIN)
-    samples = [trial.samples for trial in usable]
-    if usable[0].meaning.are_all:
-        _require_taxels(samples, usable[0].meaning.taxels)
-    shape = _announced(usable, skin, labels, options)
+    samples = [trial.samples for trial in trials]
+    if trials[0].meaning.are_all:
+        _require_taxels(samples, trials[0].meaning.taxels)
+    shape = _announced(trials, skin, labels, options)
     # What is cut at contact has no rest.
-    rest = rest_of(
-        samples, replace(options, counts=options.counts or options.onset == "first")
-    )
-    for trial, trial_labels in zip(usable, labels.of, strict=True):
+    counts = options.counts or options.onset is not None
+    rest = rest_of(samples, replace(options, counts=counts))
+    common = {"skin": skin.raw, "source": path.name}
+    for trial, trial_labels in zip(trials, labels.of, strict=True):
         name = trial.place.name
-        meta: dict[str, Any] = {"trial": name, "skin": skin.raw, "source": path.name}
-        meta["labels"] = dict(trial_labels)
-        if trial.samples.joints is not None:
-            meta["arm"] = arm and arm.to_dict()
-        if options.onset or options.onset_column:
-            source = options.onset or "event"
-            meta["onset"] = {"source": source, "times_s": trial.onsets}
+        meta = common | {"trial": name, "labels": dict(trial_labels)}
+        meta |= _meta(trial, arm, options)
         if name not in labels.left_out:
-            made = map(rest.recording, [trial.samples], [shape], [meta])
-            yield from _tried(Trial(name, recording) for recording in made)
+            recordings = map(rest.recording, [trial.samples], [shape], [meta])
+            yield from _tried(map(Trial, [name], recordings))
+
+
+def _meta(trial: Measured, arm: Chain | None, options: TableOptions) -> dict[str, Any]:
+    """What a recording says of its arm and its onsets."""
+    meta: dict[str, Any] = {}
+    if trial.samples.joints is not None:
+        meta["arm"] = arm and arm.to_dict()
+    if options.onset or options.onset_column:
+        source = options.onset or "event"
+        meta["onset"] = {"source": source, "times_s": trial.onsets}
+    return meta
 
 
 def _announced(
-    usable: Sequence[Measured],
+    trials: Sequence[Measured],
     skin: ConfigTable,
     labels: Labels,
     options: TableOptions,
 ) -> tuple[int, int]:
     """The rows and columns of the skin; prints the columns used and ignored, once for
     all files."""
-    first = usable[0]
+    first = trials[0]
     taxels = len(first.meaning.taxels)
     in_skin = skin.whole("rows", 1), skin.whole("cols", taxels)
     shape = skin_shape(first.samples, first.meaning.shape or in_skin, options)
     ignored = [name for name in first.meaning.left_out if name not in labels.columns]
-    parts = [f"{first.meaning.text(shape)}, label: {labels.source}"]
+    phrases = [f"{first.meaning.text(shape)}, label: {labels.source}"]
     if ignored:
-        parts.append(f"ignored: {', '.join(map(quoted, ignored))}")
+        phrases.append(f"ignored: {', '.join(map(quoted, ignored))}")
     if options.onset_column:
-        count = sum(len(trial.onsets) for trial in usable)
-        parts.append(f"onset: column {options.onset_column}, {count} times")
-    say("; ".join([*parts, *first.form]))
+        count = sum(len(trial.onsets) for trial in trials)
+        phrases.append(f"onset: column {options.onset_column}, {count} times")
+    say("; ".join([*phrases, *first.form]))
     if options.axes is not None:
         say(options.axes.text)
     if labels.warning:

@@ -24,7 +24,7 @@ LABEL = re.compile(
 """Names of a column that holds labels."""
 NUMBERED = re.compile(r"(?:trial|rec|recording|run|take|sample|test)?[\s_.-]*\d+", re.I)
 """Names of folders that only count trials."""
-LABEL_AND_ID = re.compile(r"([^.]*[^\W\d_][^.]*)\.[\w.-]+")
+LABEL_AND_ID = re.compile(r"[^.]*[^\W\d_][^.]*\.[\w.-]+")
 """A name of Edge Impulse: LABEL.ID, or LABEL.ID.MORE."""
 COUNT = r"[\s_.-]*\(?\d+\)?$"
 """A number at the end of a name."""
@@ -228,15 +228,15 @@ def _stated(places: Sequence[Place], label: str, task: str) -> Labels:
 def _by_name(places: Sequence[Place], task: str) -> Labels:
     """The labels that the names of files and folders tell."""
     counting = _counting([place.path for place in places])
-    ids = [LABEL_AND_ID.fullmatch(place.stem) for place in places]
+    are_ids = all(LABEL_AND_ID.fullmatch(place.stem) for place in places)
     of = []
     sources = []
-    for place, match in zip(places, ids, strict=True):
+    for place in places:
         source = "the folder's name"
         names = [part for part in place.path.parts[:-1] if part not in counting]
-        if not names and all(ids) and match:
+        if not names and are_ids:
             source = "the file's name before the first dot"
-            names = [match[1]]
+            names = [place.stem.partition(".")[0]]
         elif not names:
             source = "the file's name without the number at its end"
             names = [re.sub(COUNT, "", place.stem)]

@@ -33,13 +33,13 @@ def rows_of(recording: Recording) -> list[str]:
 
 def contacts_in(recordings: Sequence[Recording]) -> str:
     """How many recordings have a contact, and if few, why, and what to type."""
-    felt = [count_felt([each], each.layout.onset) for each in recordings]
-    text = f"{sum(felt)} of {len(recordings)} have a contact"
-    if sum(felt) >= FEW * len(recordings):
+    contacts = [count_felt([each], each.layout.onset) for each in recordings]
+    text = f"{sum(contacts)} of {len(recordings)} have a contact"
+    if sum(contacts) >= FEW * len(recordings):
         return text
     peaks = [
         int(recording.frames.max())
-        for recording, is_felt in zip(recordings, felt, strict=True)
+        for recording, is_felt in zip(recordings, contacts, strict=True)
         if not is_felt
     ]
     return (

@@ -105,6 +105,10 @@ FORMS = {
             "p4\n", "p4\n[us],N,N,N,N\n"
         ),
     ),
+    "units in names": (
+        "cup_1.csv",
+        text(TABLE.set_axis(["Zeit (s)", *(f"F {i} [N]" for i in range(4))], axis=1)),
+    ),
     "ms since 1970": ("cup_1.csv", text(timed(NS // 10**6))),
     "rostopic echo -p": ("cup_1.csv", text(ECHO).replace("field.%", "%")),
     "ros2 topic echo": ("cup_1.csv", text(STAMPS, header=False), "--taxels", "3-6"),
@@ -218,13 +222,13 @@ MENDS = {
     "raw values that fall": (text(TABLE.assign(**(700 - TABLE[TAXELS]))), "--falls"),
     "fractions": (text(TABLE.assign(**(TABLE[TAXELS] / 10))), "--scale 10"),
     "no time": (text(TABLE[TAXELS]), "--rate 100"),
-    "another name of the time": (text(timed(T, "wann")), "--time wann"),
+    "another name of the time": (text(timed(T, "wann (?)")), "--time 1"),
     "a time that stands still": (text(timed(np.arange(N) // 10 / 10)), "--rate 100"),
     "units in doubt": (text(timed(range(N))), "--time-unit s"),
-    "fingers": (PLAIN.replace(HEAD, "t,a,b,c,d\n"), "--taxels a,b,c,d"),
+    "fingers": (PLAIN.replace(HEAD, "t,a,b,c,d\n"), "--taxels a-d"),
     "names with commas": (
         text(sep=";").replace(HEAD.replace(",", ";"), "t;(0,0);(0,1);(1,0);(1,1)\n"),
-        "--taxels 2,3,4,5",
+        "--taxels 2-5",
     ),
     "two sensors": (PLAIN.replace("p3,p4", "q1,q2"), "--taxels p1-p2"),
     "degrees": (text(TABLE.assign(elbow=40.0 + T)), "--degrees", "--joints", "elbow"),
@@ -475,9 +479,12 @@ def test_trials_and_labels_in_arrays_and_parquet_are_texts(folder):
 
 
 def test_onsets_from_outside_are_kept(folder):
-    put(folder, {"cup_1.csv": "t,s1,grip\n0,1,0\n0.1,2,0\n0.2,2,1\n0.3,2,1\n"})
+    put(folder, {"cup_1.csv": "t,s1,grip\n0,1,0\n0.1,2,1\n0.2,2,1\n0.3,2,0\n0.4,2,1\n"})
     _, recordings = imported(folder, "--onset-column", "grip")
     onset = recordings["cup_1"].meta["onset"]
-    assert onset == {"source": "event", "times_s": [pytest.approx(0.2)]}
+    assert onset == {
+        "source": "event",
+        "times_s": [pytest.approx(0.1), pytest.approx(0.4)],
+    }
     _, recordings = imported(folder, "--onset", "first")
     assert recordings["cup_1"].meta["onset"] == {"source": "first", "times_s": [0.0]}

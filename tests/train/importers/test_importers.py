@@ -125,16 +125,6 @@ def test_a_damaged_file_is_one_sentence_that_names_it(content, word, tmp_path, r
     assert file.exists()
 
 
-def test_a_folder_without_grasps_is_refused(tmp_path):
-    with pytest.raises(InputError, match=r"holds no OBJECT/\*.dsa"):
-        list(sdh2.trials(tmp_path))
-
-
-def test_an_arm_is_refused(tmp_path):
-    with pytest.raises(InputError, match="joints are those of a hand"):
-        list(sdh2.trials(tmp_path, Chain.cody()))
-
-
 @pytest.fixture
 def three_grasps(tmp_path):
     """The folder of three imported grasps."""
@@ -150,6 +140,14 @@ def test_the_command_writes_a_recording_for_each_grasp(capsys, three_grasps):
     assert names == ["0000_cup.npz", "0001_cup.npz", "0002_cup.npz"]
     assert load(three_grasps / names[0]).joints.shape == (3, 7)
     assert f"recordings written to {three_grasps}: 3" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("arm", "sentence"), [(None, "holds no OBJECT"), (Chain.cody(), "leave --arm out")]
+)
+def test_a_folder_without_grasps_or_with_an_arm_is_refused(tmp_path, arm, sentence):
+    with pytest.raises(InputError, match=sentence):
+        list(sdh2.trials(tmp_path, arm))
 
 
 def test_what_cannot_be_written_is_not_called_written(capsys, tmp_path):

@@ -85,91 +85,99 @@ def differences(recording, *, with_joints=True):
 
 
 @pytest.mark.parametrize(("version", "big"), [(1, False), (2, True)])
-def test_a_bag_of_images_with_joint_states(bag, imported, version, big):
+def test_a_bag_of_images_with_joint_states(bag, imported, capsys, version, big):
     name = "grasp.bag" if version == 1 else "grasp"
     topics = skin(version=version, big=big), joints(version=version)
     recording = imported(bag(*topics, name=name, beside=BESIDE, version=version))
     assert differences(recording) == []
+    line = "frames: /skin, joint angles: /joint_states, time: of the messages"
+    assert line in capsys.readouterr().out
     assert recording.labels == {"object": "cup"}
     assert recording.layout.threshold_counts == 50
     assert recording.layout.wraps
     assert recording.joint_names == NAMES
 
 
-def publishers():
+def on_two_topics():
     """Two publishers that share the joints."""
     topic, first = joints(NAMES[:2], [0, 1])
     _, second = joints(NAMES[2:], [2, 3, 4])
     return topic, sorted(first + second, key=lambda message: message[0])
 
 
+def beside_others():
+    """Joints backwards, among others of which some have no angles."""
+    topic, states = joints(("wheel", *NAMES[::-1], "x"), [0, 4, 3, 2, 1, 0, 1])
+    base = joint_state(T[0], [], ("base_x", "base_y"))
+    unknown = joint_state(T[1], [np.nan], ("wheel",))
+    return topic, [*states, (T[0] + 0.001, base), (T[1] + 0.001, unknown)]
+
+
 @pytest.mark.parametrize(
-    ("states", "warning"),
-    [
-        (
-            joints(("wheel_left", *NAMES[::-1], "finger"), [0, 4, 3, 2, 1, 0, 1]),
-            "/joint_states: joints outside the arm: wheel_left, finger\n",
-        ),
-        (publishers(), ""),
-    ],
-    ids=["backwards among others", "of two publishers"],
+    ("states", "names"),
+    [(on_two_topics(), NAMES), (beside_others(), NAMES), (joints(()), None)],
 )
-def test_angles_are_told_apart_by_the_names_of_their_joints(
-    bag,
-    imported,
-    arm,
-    capsys,
-    states,
-    warning,
-):
+def test_angles_are_those_of_the_arms_joints_by_name(bag, imported, arm, states, names):
     recording = imported(bag(skin(), states), *arm)
     assert differences(recording) == []
-    assert recording.joint_names == NAMES
+    assert recording.joint_names == names
     assert [j["name"] for j in recording.meta["arm"]["joint"]] == list(NAMES)
-    errors = capsys.readouterr().err
-    assert warning in errors
-    assert ("outside the arm" in errors) == bool(warning)
-
-
-def test_angles_without_names_are_taken_in_the_arms_order(bag, imported, arm):
-    assert differences(imported(bag(skin(), joints(())), *arm)) == []
-
-
-def test_joints_outside_the_arm_may_have_no_angles(bag, imported, arm):
-    states = []
-    for t, q in zip(JOINT_T, JOINTS, strict=True):
-        states.append((t, joint_state(t, [*q, np.nan], (*NAMES, "wheel"))))
-        states.append((t + 0.001, joint_state(t + 0.001, [], ("base_x", "base_y"))))
-    path = bag(skin(), ("/joint_states", states))
-    assert differences(imported(path, *arm)) == []
 
 
 @pytest.mark.parametrize(
-    ("dims", "beside"),
-    [((ROWS, COLS), {}), ((), {"skin": {"rows": ROWS, "cols": COLS}})],
+    ("frames", "beside", "options"),
+    [
+        ([array(frame, dims=(ROWS, COLS)) for frame in FRAMES], {}, ()),
+        (
+            [array(frame) for frame in FRAMES],
+            {"skin": {"rows": ROWS, "cols": COLS}},
+            (),
+        ),
+        (
+            [array(frame * np.float32(0.25), kind="Float32") for frame in FRAMES],
+            {},
+            (*SHAPE, "--scale", 4),
+        ),
+    ],
 )
-def test_arrays_take_the_shape_from_the_layout_or_from_beside(
-    bag,
-    imported,
-    dims,
-    beside,
-):
-    frames = [array(frame, dims=dims) for frame in FRAMES]
-    recording = imported(bag(skin(frames), beside=beside))
+def test_arrays_are_frames(bag, imported, frames, beside, options):
+    recording = imported(bag(skin(frames), beside=beside), *options)
     assert differences(recording, with_joints=False) == []
 
 
-def test_arrays_of_floats_are_scaled_into_frames(bag, imported):
-    counts = (FRAMES % 200).astype(np.uint8)
-    frames = [array(frame * np.float32(0.25), kind="Float32") for frame in counts]
-    recording = imported(bag(skin(frames)), *SHAPE, "--scale", 4)
+def test_what_is_no_frame_is_left_out_and_said(bag, imported, capsys, tmp_path):
+    assert differences(imported(bag(skin(), joints(), camera()))) == []
+    assert "skipped /camera, which is rgb8" in capsys.readouterr().out
+    shutil.rmtree(tmp_path / "out")
+    assert len(imported(bag(damaged("/skin"), name="b")).t) == N - 1
+    assert f"1 of {N} messages" in capsys.readouterr().out
+    shutil.rmtree(tmp_path / "out")
+    (tmp_path / "c.json").write_text('{"frames_topic": "/skin"}')
+    path = bag(skin(), joints(), camera(), damaged(), name="c")
+    assert differences(imported(path)) == []
+    assert "skipped" not in capsys.readouterr().out
+
+
+def test_clocks_that_never_meet_are_joined_by_the_time_of_logging(
+    bag, imported, capsys
+):
+    pairs = zip(JOINT_T, JOINTS, strict=True)
+    states = [joint_state(t - 90.0, q) for t, q in pairs]
+    assert differences(imported(bag(skin(), skin(states, "/joints", JOINT_T)))) == []
+    assert "never meet" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("axes", [(), ("--axes", "xyz", "--flip", "y")])
+def test_a_sensors_own_message_is_read_by_the_definition_in_the_log(
+    tmp_path, imported, axes
+):
+    log = write_mcap(tmp_path / "grasp.mcap", sensor())
+    field = "taxels" if axes else "taxels.z"
+    recording = imported(log, "--field", field, *axes, *SHAPE)
+    counts = (FRAMES >> 1).astype(np.int16)
     assert np.array_equal(recording.frames, counts)
-
-
-def test_what_was_taken_from_where_is_said(bag, imported, capsys):
-    imported(bag(skin(), joints(), beside=BESIDE))
-    line = "frames: /skin, joint angles: /joint_states, time: of the messages"
-    assert line in capsys.readouterr().out
+    shear = np.stack([counts // 4, counts // 8], axis=3)
+    assert np.array_equal(recording.shear, shear) if axes else recording.shear is None
 
 
 def test_a_bag_may_be_the_current_folder(bag, tmp_path, monkeypatch):
@@ -187,50 +195,6 @@ def test_the_file_of_a_bag_is_read_without_its_folder(tmp_path, bag, imported):
     assert differences(imported(write_mcap(tmp_path / "a.mcap", *topics))) == []
 
 
-def test_a_colour_camera_beside_the_skin_is_left_out_and_said(bag, imported, capsys):
-    assert differences(imported(bag(skin(), joints(), camera()))) == []
-    sentence = "skipped /camera, which is rgb8; frames are mono16"
-    assert sentence in capsys.readouterr().out
-
-
-def test_a_damaged_frame_is_left_out_and_counted(bag, imported, capsys):
-    assert len(imported(bag(damaged("/skin"))).t) == N - 1
-    sentence = f"skipped 1 of {N} messages of /skin, the first of which has an image"
-    assert sentence in capsys.readouterr().out
-
-
-def test_a_topic_that_is_not_named_is_never_read(bag, imported, capsys):
-    topics = skin(), joints(), camera(), damaged()
-    path = bag(*topics, beside={"frames_topic": "/skin"})
-    assert differences(imported(path)) == []
-    assert "skipped" not in capsys.readouterr().out
-
-
-def test_clocks_that_never_meet_are_joined_by_the_time_of_logging(
-    bag,
-    imported,
-    capsys,
-):
-    pairs = zip(JOINT_T, JOINTS, strict=True)
-    states = [joint_state(t - 90.0, q) for t, q in pairs]
-    assert differences(imported(bag(skin(), skin(states, "/joints", JOINT_T)))) == []
-    assert "never meet; both are taken by the time" in capsys.readouterr().out
-
-
-@pytest.fixture
-def sensor_log(tmp_path):
-    """A log of a sensor's own messages."""
-    return write_mcap(tmp_path / "grasp.mcap", sensor())
-
-
-def test_a_sensors_own_message_is_read_by_the_definition_in_the_log(
-    sensor_log, imported
-):
-    recording = imported(sensor_log, "--field", "taxels.z", *SHAPE)
-    assert np.array_equal(recording.frames, FRAMES >> 1)
-    assert recording.shear is None
-
-
 def test_axes_may_be_letters_at_the_end_of_fields(tmp_path):
     axes = Axes.of("xyz", None)
     options = LogOptions(field="taxels.f", axes=axes, shape=(1, 1))
@@ -241,15 +205,6 @@ def test_axes_may_be_letters_at_the_end_of_fields(tmp_path):
     recording = log.recording()
     assert recording.frames.ravel().tolist() == [3]
     assert recording.shear.ravel().tolist() == [1, 2]
-
-
-def test_its_three_axes_are_shear(sensor_log, imported):
-    options = ("--field", "taxels", "--axes", "xyz", "--flip", "y")
-    recording = imported(sensor_log, *options, *SHAPE)
-    counts = (FRAMES >> 1).astype(np.int16)
-    assert np.array_equal(recording.frames, counts)
-    assert np.array_equal(recording.shear[..., 0], counts // 4)
-    assert np.array_equal(recording.shear[..., 1], counts // 8)
 
 
 def going_back():

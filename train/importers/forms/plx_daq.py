@@ -25,7 +25,8 @@ def tables(file: File, options: TableOptions) -> Iterator[Table]:
     blocks: list[list[str]] = [[]]
     label = ""
     for line in file.lines:
-        command, _, cells = line.strip().partition(",")
+        text = re.sub(r",AUTOSCROLL_\d+$", "", line.strip())
+        command, _, cells = text.partition(",")
         command = command.upper()
         if command in ("CLEARDATA", "CLEARSHEET"):
             blocks.append([])

@@ -87,24 +87,9 @@ def table_of(where: str, lines: Sequence[str], note: str = "") -> Table:
         if mark != "," and any(map(COMMA.search, data.values())):
             decimal = ","
             notes.append("decimal commas")
-        missing = {name: [""] for name in unique}
-        missing |= {unique[i]: NO_NUMBER for i in columns}
-        # As bytes, for a `StringIO` takes four for each character. Texts and the names
-        # of trials stand as they are: a label may be `NA`, and 007 is not trial 7.
-        table = pd.read_csv(
-            io.BytesIO("\n".join(data.values()).encode()),
-            sep=mark or r"\s+",
-            header=None,
-            names=unique,
-            index_col=False,
-            skipinitialspace=True,
-            dtype={"trial": str},
-            decimal=decimal,
-            keep_default_na=False,
-            na_values=missing,
-            low_memory=False,
-        )
-    table = table.set_axis(pd.Index([*data], name="line"))
+        empty_cells = {name: [""] for name in unique}
+        empty_cells |= {unique[i]: NO_NUMBER for i in columns}
+        table = _parsed(data, mark, decimal, empty_cells)
     # A separator at the ends of rows makes a column without a name or a value.
     named = set(filter(None, names or unique[:-1]))
     empty = table.columns[table.isna().all()].difference(named)
@@ -116,6 +101,34 @@ def table_of(where: str, lines: Sequence[str], note: str = "") -> Table:
         file_names=tuple(unique),
         units=dict(zip(unique, units, strict=False)),
     )
+
+
+def _parsed(
+    rows: Mapping[int, str],
+    mark: str,
+    decimal: str,
+    empty_cells: Mapping[str, list[str]],
+) -> pd.DataFrame:
+    """The columns of rows; the index is the line of each.
+
+    Texts and the names of trials stand as they are: a label may be `NA`, and trial 007
+    is not trial 7.
+    """
+    table = pd.read_csv(
+        # As bytes, for a `StringIO` takes four for each character.
+        io.BytesIO("\n".join(rows.values()).encode()),
+        sep=mark or r"\s+",
+        header=None,
+        names=list(empty_cells),
+        index_col=False,
+        skipinitialspace=True,
+        dtype={"trial": str},
+        decimal=decimal,
+        keep_default_na=False,
+        na_values=dict(empty_cells),
+        low_memory=False,
+    )
+    return table.set_axis(pd.Index([*rows], name="line"))
 
 
 def _cells(text: str, mark: str) -> list[str]:

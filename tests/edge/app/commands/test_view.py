@@ -29,17 +29,6 @@ def test_view_draws_the_skin_at_a_bounded_rate(edge, exported, recordings):
     assert text.endswith("\x1b[0m\x1b[?25h")
 
 
-@pytest.mark.usefixtures("person")
-def test_view_draws_a_picture_each_time_one_is_due(edge, recordings, monkeypatch):
-    """Half a frame early or late, so that a clock that shifts by less does not skip
-    one."""
-    times = []
-    monkeypatch.setattr(view, "draw", lambda frame, *rest: times.append(frame.t) or ".")
-    options = ("--fake", recordings / "hard_0.npz", "--seconds", 0.6)
-    assert edge("view", *options, text=True)[0] == 0
-    assert np.round(np.diff(times), 2).tolist() == [0.1] * 5
-
-
 def test_a_pipe_is_refused(refused, recordings):
     err = refused("view", "--fake", recordings / "hard_0.npz")
     assert "give it a terminal or --web; `edge-classify run` prints JSON lines" in err

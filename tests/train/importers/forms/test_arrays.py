@@ -63,11 +63,6 @@ def test_the_array_that_is_named_as_the_time_tells_the_frames():
     assert len(table_of("a.mat", stored, options).data) == 6
 
 
-def test_an_array_of_rows_and_columns_tells_the_shape():
-    stored = {"t": np.arange(6.0), "skin": FRAMES.reshape(6, 2, 2)}
-    assert table_of("a.mat", stored, OPTIONS).shape == (2, 2)
-
-
 def of_structures(path):
     trials = np.zeros(2, dtype=[("frames", "O"), ("label", "O")])
     trials[0] = (FRAMES, "cup")
@@ -143,11 +138,6 @@ def test_a_structure_within_a_trial_is_left_out(tmp_path):
     trials = list(trials_of(read_arrays(File(tmp_path / "a.mat")), "object"))
     assert [labels for labels, _ in trials] == [{}, {}]
     assert [list(arrays) for _, arrays in trials] == [["frames"], ["frames"]]
-
-
-def test_a_file_without_trials_holds_no_values():
-    with pytest.raises(InputError, match="holds no values"):
-        list(trials_of({"a": np.zeros((0, 3))}, "object"))
 
 
 def test_arrays_with_other_numbers_of_trials_are_named():
