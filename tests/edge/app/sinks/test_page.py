@@ -162,6 +162,9 @@ def test_labels_and_recording_are_set_from_the_page(page):
     act(page, "record", on=True)
     assert page.recording
 
+    act(page, "unlabel", task="object")
+    assert not page.recording
+
 
 @pytest.mark.parametrize(
     "action",
@@ -194,7 +197,9 @@ def test_a_label_that_is_given_leaves_those_of_other_tasks(page):
 
 
 def test_recording_waits_for_the_choice_of_a_label(serve):
+    assert serve(labels={"object": "box"}).recording
     page = serve(labels={"object": "box", "softness": None})
+    assert not page.recording
     with pytest.raises(InputError, match="give softness first"):
         act(page, "record", on=True)
     act(page, "labels", labels={"softness": "soft"})
