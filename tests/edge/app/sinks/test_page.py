@@ -44,6 +44,7 @@ def test_a_picture_has_the_skin(picture):
     assert picture["dead"] == (5,)
     assert np.flatnonzero(picture["counts"]).tolist() == [8, 9]
     assert picture["invalid"] == [18]
+    assert (picture["choices"], picture["decides"]) == ({}, False)
 
 
 def test_a_picture_has_the_contact_since_onset(picture):
@@ -196,15 +197,16 @@ def test_a_label_that_is_given_leaves_those_of_other_tasks(page):
     assert page.labels == {"softness": "soft"}
 
 
-def test_recording_waits_for_the_choice_of_a_label(serve):
+@pytest.mark.parametrize("others", [{}, {"object": "box"}])
+def test_recording_waits_for_the_choice_of_a_label(serve, others):
     assert serve(labels={"object": "box"}).recording
-    page = serve(labels={"object": "box", "softness": None})
+    page = serve(labels={**others, "softness": None})
     assert not page.recording
     with pytest.raises(InputError, match="give softness first"):
         act(page, "record", on=True)
     act(page, "labels", labels={"softness": "soft"})
     assert page.recording
-    assert page.labels == {"object": "box", "softness": "soft"}
+    assert page.labels == {**others, "softness": "soft"}
 
 
 def test_a_page_without_a_folder_changes_nothing(serve):
@@ -323,5 +325,7 @@ def test_a_picture_tells_when_the_list_has_changed(folder_page, pictures):
     folder_page.push(still)
     change(folder_page, "leave_out", "a.npz")
     folder_page.push(replace(still, t=1.0))
-    before, after = (picture["trials"] for picture in pictures)
-    assert after > before
+    folder_page.saved()
+    folder_page.push(replace(still, t=2.0))
+    before, changed, saved = (picture["trials"] for picture in pictures)
+    assert saved > changed > before
