@@ -133,7 +133,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 def _write(arguments: argparse.Namespace, fitted: Fitted) -> Model:
     """Write the model and what is asked for beside it, and print what was fitted."""
-    from export.api import measure, save  # loads ONNX
+    from export.api import measure, save  # loads skl2onnx, for two seconds
 
     path = arguments.out / "model.onnx"
     size = save(path, fitted, arguments.name, partial(_write_c, arguments))
