@@ -304,11 +304,12 @@ def test_a_decision_is_accepted_and_corrected_with_undo(kept_page, touch_folder)
 
 def test_what_is_doubtful_stands_beside_its_touch_and_the_next_labels(folder_page):
     change(folder_page, "relabel", "a.npz", labels={"category": "rigid-fixed"})
-    act(folder_page, "labels", labels={"category": "soft-movable"})
+    wrong = {"category": "rigid-fixed", "softness": "soft", "mobility": "fixed"}
+    act(folder_page, "labels", labels=wrong)
     answer = act(folder_page, "trials")
     doubtful = {touch["file"] for touch in answer["trials"] if touch["doubts"]}
     assert doubtful == {"a.npz"}
-    assert answer["doubts"] == []
+    assert [text.split()[0] for text in answer["doubts"]] == ["category='rigid-fixed'"]
 
 
 def test_touches_that_come_into_the_folder_are_shown(
@@ -327,5 +328,6 @@ def test_a_picture_tells_when_the_list_has_changed(folder_page, pictures):
     folder_page.push(replace(still, t=1.0))
     folder_page.saved()
     folder_page.push(replace(still, t=2.0))
+    assert pictures[0]["invalid"] == []
     before, changed, saved = (picture["trials"] for picture in pictures)
     assert saved > changed > before
