@@ -31,6 +31,10 @@ def within(kind: type, low: float, high: float) -> Callable[[str], float]:
     return parse
 
 
+seconds = within(float, 1e-3, 1e9)
+"""The type of an option that takes a duration."""
+
+
 def add_file(
     parser: argparse.ArgumentParser, name: str, text: str, *, needed: bool = False
 ) -> None:
@@ -77,7 +81,7 @@ def add_reading(parser: argparse.ArgumentParser, web: str = "") -> None:
     add_skin(parser)
     parser.add_argument(
         "--seconds",
-        type=within(float, 1e-3, 1e9),
+        type=seconds,
         default=math.inf,
         help="time after which to stop (default: never)",
     )

@@ -160,7 +160,7 @@ class JointDecision(Early):
 def paired(
     info: ModelInfo, candidate: Decided, decided: Mapping[str, Decided]
 ) -> Decided:
-    """The answer to a product by its factors' labels. A pair that was never met has no
+    """The answer to a product by its factors' labels. An unseen pair has no
     name, nor has one with an unknown factor."""
     task = info.tasks[candidate.task]
     indices = {}

@@ -23,7 +23,7 @@ from edge.errors import InputError, counted
 from edge.record.changes import FORMER, Change, change, former, now, undo
 from edge.record.labels import Standing, Table, read_table
 from edge.record.recording import read_meta
-from edge.record.saving import listed, warn_of_remains
+from edge.record.saving import listed, warn_of_gone
 from edge.record.slips import counts_text, slips
 
 CHANGES = ("set", "unset", "accept", "leave_out", "put_back", "rows")
@@ -88,7 +88,7 @@ def run(arguments: argparse.Namespace) -> int:
         raise InputError("--set and --unset name a task twice; name it once")
     table_of = cache(read_table)
     paths = listed(arguments.data)
-    warn_of_remains(paths, table_of)
+    warn_of_gone(paths, table_of)
     touches = read(paths, table_of)
     selected = review.selected(touches, arguments.only)
     if not selected:

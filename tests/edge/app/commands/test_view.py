@@ -67,15 +67,6 @@ def test_a_taxel_that_cannot_be_read_is_blue():
     assert np.argwhere(colour == view.LOST).tolist() == [[2, 3]]
 
 
-def test_two_rows_make_a_line_and_colours_are_sent_where_they_change():
-    text = view.picture(
-        np.array([[1, 1, 2], [3, 3, 3], [4, 4, 4]], dtype=np.uint8), wide=1
-    )
-    assert text == (
-        "\x1b[38;5;1;48;5;3m▀▀\x1b[38;5;2;48;5;3m▀\x1b[0m\n\x1b[38;5;4;49m▀▀▀\x1b[0m"
-    )
-
-
 def test_no_color_draws_digits_by_force(monkeypatch):
     monkeypatch.setenv("NO_COLOR", "1")
     colours = np.array([[view.REST[0], view.TOUCH[0]], [view.LOST, view.TOUCH[-1]]])

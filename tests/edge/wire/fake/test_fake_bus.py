@@ -69,13 +69,3 @@ def test_a_mux_connects_at_stop_and_two_chips_at_one_address_pull_the_same_wire(
     assert connected == [[]]
     assert mux.connected == [0, 1]
     assert fetch(fake, 0x20, b"", 1) == bytes([0b1000])
-
-
-def test_time_advances_by_the_bits_only_where_it_is_asked_for():
-    still = bus()
-    timed = bus(timed=True, clock_hz=100_000)
-    for fake in (still, timed):
-        fetch(fake, 0x10, b"\x00", 4)
-        assert fake.bits == 1 + 18 + 1 + 45 + 1
-    assert still.now() == 0.0
-    assert timed.now() == pytest.approx(66 / 100_000)
