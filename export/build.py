@@ -142,7 +142,10 @@ class Builder:
         """Add an operator, as `node`; returns the names of its outputs."""
         place = len(self.made)
         names = [name or f"{operator} {place} {i}" for i, name in enumerate(outputs)]
-        proto = helper.make_node(operator, self._names(inputs), names, **attributes)
+        # skl2onnx orders nodes by their names, and those without one by their addresses.
+        proto = helper.make_node(
+            operator, self._names(inputs), names, name=str(place), **attributes
+        )
         self.made.append(proto)
         return names
 

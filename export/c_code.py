@@ -1,51 +1,53 @@
-"""A model as C99 for a microcontroller: the files of `export/c`, of which `model.h` and
-`model.c` take the model's numbers."""
+"""A model as C99 for a microcontroller: the files of `export/c`, of which `model.h` takes
+the sizes and `model.c` the bytes of `model.bin`, the model as data."""
 
 from __future__ import annotations
 
 import math
 import os
-import re
 import string
-from collections.abc import Iterable, Mapping, Sized
+import zlib
+from collections.abc import Iterable, Mapping, Sequence
 from contextlib import ExitStack
 from math import inf
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from edge.arrays import Array, Floats
 from edge.decide.doubts import GAP_S, PERIODS
 from edge.decide.early import stopping_rules
-from edge.decide.info import ModelInfo, Novelty, Remoteness, StoppingRule
+from edge.decide.info import ModelInfo, StoppingRule
 from edge.decide.model import Model
 from edge.elementary import log, logistic, sin
 from edge.errors import InputError
 from edge.features.cells import KERNEL_CELLS, Cells
 from edge.features.kernels import BIASES, CONVOLUTIONS, KernelTable, mixes
-from edge.features.names import feature_types, zones_of
+from edge.features.names import Feature, feature_types, zones_of
 from edge.features.quantities import ALONE, OF_ZONES, force_floor, length_floor
 from edge.touch.layout import SkinLayout
 from edge.writing import write_whole
-from export.c_graph import CompiledGraph, Step
+from export.formula import Formula
+from export.image import NOWHERE, ROOMS, SIZES, TABLES, Image, Pools, record
 
-ROOMS = Path(__file__).parent / "c"
 CODE_BYTES = 28 * 1024
 """Of all rooms, with small tables and the arithmetic of doubles, by gcc 12 with -O2 for a
 Cortex-M0+."""
 KERNEL_BYTES = 4608
 """Of the code of kernels, and of the channels that each sums up."""
 COSTS = {
-    "task": (14000, 27000),
+    "task": (6800, 14000),
     "convolution": (6600, 8900),
-    "root": (1340, 3100),
-    "row": (704, 1365),
-    "product": (12.8, 49.3),
-    "number": (301, 776),
+    "root": (550, 670),
+    "row": (1036, 2270),
+    "product": (13.4, 56.6),
+    "trial": (430, 929),
+    "square": (30.4, 116),
 }
 """Instructions of a Cortex-M4F and of a Cortex-M0+ for the parts of a decision, fitted
 to what QEMU counted: roots and logarithms of values, rows of projections, products of
-matrices, and numbers that other steps of the graph take."""
+matrices, trials, and coordinates of these."""
 REST_OF_RAM = 2048 + 2100
 """Of the stack, and of what does not depend on the model."""
 LONG_STEP_S = 0.95 * GAP_S / PERIODS
@@ -54,19 +56,16 @@ LARGEST = 2**63
 """No product of a frame's sums may reach it."""
 MOST_SUMMED = 128
 """Samples beyond which numpy sums up in halves."""
-TYPE_OF = {"palette": "uint8", "packed": "uint8"}
-"""The types of tables that are no types of C."""
 PROBE = 0.3
 PROBES = 8
-DOUBTS = ("novelty", "remoteness")
-FLAGS = ("out_of_range", *DOUBTS)
-"""Outputs of the model that are of no task."""
-SPECIAL = re.compile(r"[^\w -]", re.ASCII)
-"""Letters that may mean something else in C."""
-ENDS = "label scores distances neighbours label_distances".split()
-OF_LAYOUT = "rows cols wraps threshold_counts onset release_s radius_m row0_z_m".split()
-OF_INFO = "debounce window_s width joints dof".split()
-"""Attributes that are constants of the preprocessor, by their names."""
+OF_PROGRAM = ("rows", "cols", "wraps")
+OF_LAYOUT = ("threshold_counts", "onset", "release_s", "radius_m", "row0_z_m")
+"""Attributes of a layout that have their names in C."""
+TRANSFORMS = ("none", "log", "sqrt", "relative")
+SUMMARIES = ("", "rate", "mean", "deviation", "roughness")
+LINKS = ("fixed", "revolute", "continuous", "prismatic")
+ZONES = ("contact", "skin", "left", "right", "no_zone")
+"""In the order of their numbers in C."""
 
 
 def export(
@@ -121,10 +120,10 @@ class Source:
     """A model in C.
 
     Attributes:
-        values: what stands for the names in the rooms' `model.h` and `model.c`.
         flash: bytes of code and tables.
         ram: bytes.
         work: of a decision, how much there is of each of `COSTS`.
+        image: the model as data.
     """
 
     def __init__(
@@ -145,90 +144,169 @@ class Source:
         self._info = model.info
         self._layout = model.info.layout
         self._types = feature_types(model.info.features)
-        windows_s = model.decision_points_s
-        self._last = len(windows_s) if error is not None else 1
+        self._doubts = doubts and model.info.novelty is not None
+        count = len(model.decision_points_s)
+        self._points = range(0 if error is not None else count - 1, count)
         self._zones = zones_of(self._types)
-        self.values: dict[str, object] = {
-            "early": error is not None,
-            "windows_s": windows_s[-self._last :],
-            "long_step_s": LONG_STEP_S,
-            "repeats": int(model.info.repeats),
-            **quantities_in_c(),
-            "long_steps": int(model.info.window_s / LONG_STEP_S) + 2,
+        self._pools = Pools()
+        self._formula = Formula(model, self._points, self._pools)
+        self.work: dict[str, float] = {"task": len(model.info.tasks)}
+        self._tables: dict[str, Any] = {
+            "projections": self._formula.projections,
+            "windows_s": [model.decision_points_s[i] for i in self._points],
         }
-        for owner, names in ((self._layout, OF_LAYOUT), (self._info, OF_INFO)):
-            self.values |= {name: getattr(owner, name) or 0 for name in names}
-        self.flash = CODE_BYTES
-        self.ram = 0
-        self.work: dict[str, float] = dict.fromkeys(COSTS, 0.0)
-        self.work["task"] += len(model.info.tasks)
-        outputs = set(model.info.outputs) - set(() if doubts else DOUBTS)
-        points = range(len(windows_s))[-self._last :]
-        room = self._info.width + self._features()
-        graph = CompiledGraph(model, outputs, points, room)
+        self._sizes: dict[str, int] = {
+            "points": len(self._points),
+            "tasks": len(model.info.tasks),
+            "spaces": self._formula.spaces,
+            "features": len(self._types),
+            "width": self._info.width,
+            "joints": self._info.joints,
+            "long_steps": int(model.info.window_s / LONG_STEP_S) + 2,
+            "has_novelty": self._doubts,
+        }
+        self._features()
         self._skin()
         self._geometry()
-        self._graph(graph)
-        rules = {} if error is None else stopping_rules(model, error)
-        self._tasks(graph.places, rules)
-        self._limits(doubts)
-        self.values["checksum"] = str(checksum(model) if graph.steps else 0)
+        self._tasks({} if error is None else stopping_rules(model, error))
+        if self._doubts:
+            self._limits()
+        self._sizes["components"] = self._formula.components
+        for kind, amount in self._formula.work.items():
+            self._add_work(kind, amount)
+        header = {
+            "program": program(self._layout),
+            "trials": self._formula.trials,
+            "numbers": self._numbers(model, error is not None),
+            "sizes": record("ec_sizes", **self._sizes),
+        }
+        empty = dict.fromkeys(TABLES, ())
+        self.image = Image(header, empty | self._tables | self._pools.tables())
+        kernels = KERNEL_BYTES * (self._sizes["channels"] > 0)
+        self.flash = CODE_BYTES + kernels + self.image.size
+        self.ram = self._ram()
 
     def instructions(self) -> Floats:
         """(2,) about how many a decision takes on each processor of `COSTS`."""
-        amounts = np.array(list(self.work.values()))
-        return np.asarray(amounts @ np.array(list(COSTS.values())))
+        costs = np.array([COSTS[kind] for kind in self.work])
+        return np.asarray(np.array([*self.work.values()]) @ costs)
 
     def write(self, folder: Path) -> None:
         """Write all files, whole or not at all."""
-        values = {}
-        for name, value in self.values.items():
-            values[name] = literal(value)
-            if isinstance(value, Sized):
-                values[f"{name}_count"] = str(len(value))
-        write_rooms(ROOMS, folder, values)
+        image = self.image
+        header = image.header().tolist()[0]
+        sizes = {name: self._sizes.get(name, 0) for name in SIZES}
+        values = {
+            **quantities_in_c(),
+            **{name: literal(getattr(self._layout, name)) for name in OF_PROGRAM},
+            "program": str(program(self._layout)),
+            "ram": str(self.ram),
+            "most": literal(sizes.values()),
+            "sizes": "\n".join(
+                f"#define EC_MOST_{name.upper()} {int(n)}" for name, n in sizes.items()
+            ),
+            "fields": "\n".join(image.fields()),
+            "digests": digests(header),
+            "big_digests": digests(image.header(">").tolist()[0]),
+            "header": ", ".join(map(literal, header[3:])),
+            "tables": ",\n".join(map(literal, image.values())),
+        }
+        write_rooms(ROOMS, folder, values, {"model.bin": image.data()})
 
-    def _features(self) -> int:
-        """The `ec_course` and the `ec_feature` of each feature, and the tables of the
-        kernels, from which some are computed; how many doubles summaries take."""
-        courses: dict[tuple[object, ...], int] = {}
-        places = [0]
-        rows = []
+    def _numbers(self, model: Model, early: bool) -> Array:
+        layout = self._layout
+        info = self._info
+        values = {name: getattr(layout, name) or 0 for name in OF_LAYOUT}
+        along, around = layout.pitch
+        return record(
+            "ec_numbers",
+            **values,
+            along=along,
+            around=around,
+            scale=float(layout.counts_per_newton or 1.0),
+            window_s=info.window_s,
+            long_step_s=LONG_STEP_S,
+            force_floor=force_floor(layout),
+            length_floor=length_floor(layout),
+            column_angles=len(layout.column_angles_deg or ()) > 1,
+            dof=info.dof or 0,
+            link_count=len(info.chain.links) if info.chain else 0,
+            debounce=info.debounce,
+            repeats=info.repeats,
+            early=early,
+            naming=self._naming(),
+            text=self._pools.text(info.name or ""),
+            checksum=checksum(model) if self._formula.spaces else 0,
+        )
+
+    def _features(self) -> None:
+        """The courses, and the features that are made of them."""
+        courses: dict[tuple[int, int, int, int], int] = {}
+        features = []
+        place = 0
         summed = 0
         for feature, width in zip(self._types, self._info.widths, strict=True):
-            samples = feature.samples or self._info.samples
-            sums_up = feature.summary not in ("", "rate")
-            count = width if sums_up else width // samples
-            quantity = feature.quantity
-            zone = 0 if quantity.zone else self._zones.index(feature.zone)
-            course = samples, count, zone, quantity.code.replace("CHANGE", "ANGLE")
-            if quantity.kernels:
-                self.work["convolution"] += CONVOLUTIONS
+            course = self._course(feature, width)
+            samples, count, *_ = course
+            if feature.quantity.kernels:
+                self._add_work("convolution", CONVOLUTIONS)
             elif course not in courses:
-                courses[course] = len(courses)
-                places.append(places[-1] + samples * count)
-            if sums_up:
+                courses[course] = place
+                place += samples * count
+            if feature.summary not in ("", "rate"):
                 together = count if "relative" in feature.transforms else 1
                 summed = max(summed, samples * together)
             roots = {"log", "sqrt"}.intersection(feature.transforms)
-            self.work["root"] += (samples * count * len(roots)) * (not quantity.kernels)
-            row = [
-                quantity.floor(self._layout),
-                courses.get(course, 0),
-                quantity.code,
-                [f"EC_T_{kind.upper()}" for kind in feature.transforms],
-                f"EC_S_{feature.summary.upper()}",
-            ]
-            rows.append(row)
-        fields = [[*c, place] for c, place in zip(courses, places, strict=False)]
-        self.values |= {"features": rows, "courses": fields, "value_count": places[-1]}
-        self.ram += self._last * 8 * places[-1]
-        for name in ("taxel_kernels", "zone_kernels"):
-            table = self._info.kernels.get(name, KernelTable((), ()))
-            self.values[name] = kernel_fields(table)
-            if table.shifts:
-                self.flash += KERNEL_BYTES + 4 * len(table.biases)
-        return summed
+            if not feature.quantity.kernels:
+                self._add_work("root", samples * count * len(roots))
+            kinds = [TRANSFORMS.index(kind) for kind in feature.transforms]
+            made = record(
+                "ec_feature",
+                floor=feature.quantity.floor(self._layout),
+                course=[*courses].index(course) if course in courses else 0,
+                quantity=codes().index(feature.quantity.code),
+                transforms=[*kinds, 0, 0, 0][:3],
+                summary=SUMMARIES.index(feature.summary),
+            )
+            features.append(made)
+        names = ("samples", "rows", "zone", "quantity")
+        self._tables["features"] = features
+        self._tables["courses"] = [
+            record("ec_course", place=place, **dict(zip(names, course, strict=True)))
+            for course, place in courses.items()
+        ]
+        self._tables["kernels"] = [
+            self._kernels(self._info.kernels.get(name, KernelTable((), ())))
+            for name in ("taxel_kernels", "zone_kernels")
+        ]
+        self._sizes |= {"courses": len(courses), "values": place, "summed": summed}
+
+    def _course(self, feature: Feature, width: int) -> tuple[int, int, int, int]:
+        """Samples, rows, zone and quantity of what a feature is made of."""
+        samples = feature.samples or self._info.samples
+        sums_up = feature.summary not in ("", "rate")
+        quantity = feature.quantity
+        return (
+            samples,
+            width if sums_up else width // samples,
+            0 if quantity.zone else self._zones.index(feature.zone),
+            codes().index(quantity.code.replace("CHANGE", "ANGLE")),
+        )
+
+    def _add_work(self, kind: str, amount: float) -> None:
+        self.work[kind] = self.work.get(kind, 0) + amount
+
+    def _kernels(self, table: KernelTable) -> Array:
+        """The `ec_kernels` of a table, which may be empty."""
+        mixed = mixes(len(table.shifts)) if table.shifts else ()
+        flat = [n for mix in mixed for n in (mix.sum(), *np.flatnonzero(mix))]
+        return record(
+            "ec_kernels",
+            shifts=self._pools.add("bytes", np.array(table.shifts, np.int8)),
+            biases=self._pools.add("longs", table.biases),
+            mixes=self._pools.add("bytes", flat),
+            biases_of_dilation=BIASES.get(len(table.biases), (0, 0, 0, 0)),
+        )
 
     def _skin(self) -> None:
         """The skin, and what is measured in every frame."""
@@ -236,173 +314,183 @@ class Source:
         used = [feature.quantity for feature in self._types]
         quantities = {quantity.name for quantity in used}
         motions = {quantity.motion for quantity in used}
-        cells = Cells(layout)
-        kernel_cells = Cells(layout, KERNEL_CELLS)
-        pooled = cells.count * ("taxel_force" in quantities)
-        pooled_for_kernels = kernel_cells.count * ("taxel_kernels" in quantities)
+        pooled = {}
+        for table, side, name in (
+            ("cell", 1, "taxel_force"),
+            ("kernel_cell", KERNEL_CELLS, "taxel_kernels"),
+        ):
+            cells = Cells(layout, side) if side > 1 else Cells(layout)
+            is_used = name in quantities
+            pooled[f"{table}s"] = cells.count * is_used
+            of_taxel = _of_taxels(layout, cells) if is_used else ()
+            self._tables[f"{table}_of_taxel"] = of_taxel
         zone_channels = 8 * len(self._zones) * ("zone_kernels" in quantities)
-        zones = max(len(self._zones), 1)
-        unsure = 2 * len(self._zones) + 3 + self._info.joints
-        row = 40 + 8 * max(self._info.joints, 1) + 121 * zones + 8 * unsure
-        row += 4 * max(pooled, 1) + 4 * max(pooled_for_kernels, 1)
-        self.ram += 4 * row + 48 * unsure + 9 * layout.alive.size
-        self.ram += self._last * 240 * (zone_channels + pooled_for_kernels)
-        self.values |= {
-            "cells": pooled,
-            "kernel_cells": pooled_for_kernels,
+        self._tables["zone_names"] = [
+            ZONES.index(name) for name in (*self._zones, "no_zone")
+        ]
+        self._tables["alive"] = layout.alive.reshape(-1)
+        self._sizes |= pooled
+        self._sizes |= {
+            "zones": len(self._zones),
             "zone_channels": zone_channels,
-            "channels": zone_channels + pooled_for_kernels,
+            "channels": zone_channels + pooled["kernel_cells"],
             "motion": "motion" in motions,
+            "force_motion": "force_motion" in motions,
             "centroids": not quantities.isdisjoint(("along", "around")),
             "spreads": any("SPREAD" in (quantity.c or "") for quantity in used),
-            "force_motion": "force_motion" in motions,
-            "zone_names": [f"EC_{name.upper()}" for name in (*self._zones, "no_zone")],
-            "cell_of_taxel": _of_taxels(layout, cells) if pooled else (),
-            "kernel_cell_of_taxel": (
-                _of_taxels(layout, kernel_cells) if pooled_for_kernels else ()
-            ),
         }
 
     def _geometry(self) -> None:
-        """Where the taxels lie, on which arm, and the scale of their counts."""
-        layout = self._layout
-        along, around = layout.pitch
-        angles = layout.column_angles_deg or (0.0,)
+        """Where the taxels lie, and on which arm."""
+        angles = self._layout.column_angles_deg or (0.0,)
         steps = (np.diff([*angles, angles[0]]) + 180.0) % 360.0 - 180.0
-        links = []
         chain = self._info.chain
-        for kind, axis, step, after in chain.links if chain else ():
-            links.append([axis, np.ravel(step), after, f"EC_{kind.upper()}"])
         joints = self._info.joints
         ranges = [*(chain.limits if chain else ()), *[None] * joints]
         still_s = [*self._info.still_s, *[inf] * joints]
-        limits = list(zip(ranges, still_s, strict=False))[:joints]
-        self.values |= {
-            "limits": [[*(span or (-inf, inf)), still] for span, still in limits],
-            "along": along,
-            "around": around,
-            "scale": float(layout.counts_per_newton or 1.0),
-            "force_floor": force_floor(layout),
-            "length_floor": length_floor(layout),
-            "column_angles": len(angles) > 1,
-            "alive": layout.alive.reshape(-1),
-            "angles": zip(angles, steps, strict=True),
-            "links": links,
-        }
+        self._tables["angles"] = [*zip(angles, steps, strict=True)]
+        self._tables["links"] = [
+            record(
+                "ec_link",
+                axis=axis,
+                step=np.ravel(step),
+                after=after,
+                kind=LINKS.index(kind),
+            )
+            for kind, axis, step, after in (chain.links if chain else ())
+        ]
+        self._tables["limits"] = [
+            (*(span or (-inf, inf)), still)
+            for span, still in list(zip(ranges, still_s, strict=False))[:joints]
+        ]
 
-    def _graph(self, graph: CompiledGraph) -> None:
-        """The steps and the tables of the graph."""
-        tables = []
-        for table in graph.tables:
-            kind = TYPE_OF.get(table.type, table.type)
-            values = array(f"{kind}_t", table.data.reshape(-1))
-            palette = array("double", table.palette) if table.palette.size else 0
-            stride = (table.data.ndim - 1) * table.data.shape[-1]
-            code = f"EC_{table.type.upper()}"
-            tables.append([values, palette, stride, table.columns, code, table.shift])
-            self.flash += table.nbytes
-        steps = []
-        for step in graph.steps:
-            self._weigh(step, graph)
-            steps.append([step.inputs, step.outputs, step.sizes, step.operator])
-        most_columns = max((table.columns for table in graph.tables), default=0)
-        self.flash += 26 * len(graph.steps) + 20 * len(graph.tables)
-        self.ram += 8 * (graph.arena + most_columns) + REST_OF_RAM
-        self.values |= {
-            "arena": graph.arena,
-            "ram": self.ram,
-            "tables": tables,
-            "steps": steps,
-            "most_columns": most_columns,
-        }
-
-    def _weigh(self, step: Step, graph: CompiledGraph) -> None:
-        """Count the work of a step."""
-        size, along, behind, count = [*step.sizes, 1, 1, 1][:4]
-        if step.operator == "EC_PROJECT":
-            self.work["row"] += along
-            count = graph.tables[step.inputs[3] - graph.arena].columns
-        if step.operator in ("EC_PROJECT", "EC_GEMM", "EC_MATMUL"):
-            self.work["product"] += along * count
-        elif step.operator.startswith(("EC_REDUCE", "EC_TOPK")):
-            self.work["number"] += size * along * behind
-        elif step.operator.startswith("EC_GATHER"):
-            self.work["number"] += size * behind * count
-        else:
-            self.work["number"] += size
-
-    def _tasks(
-        self, places: Mapping[str, int], rules: Mapping[str, StoppingRule | None]
-    ) -> None:
+    def _tasks(self, rules: Mapping[str, StoppingRule | None]) -> None:
         """The tasks, their labels and their calibration."""
         tasks = self._info.tasks
         names = list(tasks)
         rows = []
-        labels = []
         for name, task in tasks.items():
             rule = rules.get(name)
-            indices = [array("uint8_t", column) for column in task.factors.values()]
-            row = [
-                *self._curves(name),
-                *((rule.confidence, rule.last, True) if rule else (0, 0, False)),
-                [places.get(f"{name}_{end}", 0) for end in ENDS],
-                len(task.labels),
-                task.k,
-                indices,
-                [names.index(factor) for factor in task.factors],
-            ]
-            rows.append(row)
-            labels.append(array("char *const", map(quoted, task.labels)))
-        self.values |= {f"place_{name}": places.get(name, 0) for name in FLAGS}
-        self.values |= {
-            "most_labels": max(len(task.labels) for task in tasks.values()),
-            "tasks": rows,
-            "labels": labels,
-            "task_names": map(quoted, names),
+            indices = [self._pools.add("words", of) for of in task.factors.values()]
+            stopping = self._info.stopping.get(name)
+            factors = [names.index(factor) for factor in task.factors]
+            made = record(
+                "ec_task",
+                text=self._pools.text(name, *task.labels),
+                indices=indices or NOWHERE,
+                factors=factors or 0,
+                labels=len(task.labels),
+                k=task.k,
+                **self._formula.task(name),
+            )
+            if stopping is not None:
+                made["rule_curve"] = stopping.slope, stopping.intercept, stopping.doubt
+            if rule:
+                made["rule_confidence"] = rule.confidence
+                made["rule_last"] = rule.last
+                made["has_rule"] = True
+            rows.append(made)
+        self._tables["tasks"] = rows
+        # Of a space the rows with most components come first: others are parts of them.
+        wide = sorted(tasks, key=lambda name: -tasks[name].components)
+        places = {
+            (point, name): self._formula.place(name, point, self._curve(name, point))
+            for point in self._points
+            for name in wide
+        }
+        self._tables["places"] = [
+            places[point, name] for point in self._points for name in names
+        ]
+        self._sizes |= {
+            "labels": max(len(task.labels) for task in tasks.values()),
+            "neighbours": max(task.k for task in tasks.values()),
+            "nearest": self._formula.nearest,
         }
 
-    def _curves(self, task: str) -> list[object]:
-        """The curves of a task: those of the decision points, and that of the rules."""
-        stopping = self._info.stopping.get(task)
-        if stopping is None:
-            return [0, (0, 0, 0)]
-        curves = zip(stopping.slopes, stopping.intercepts, stopping.doubts, strict=True)
-        rules = stopping.slope, stopping.intercept, stopping.doubt
-        return [array("ec_curve", [*curves][-self._last :]), rules]
+    def _curve(self, task: str, point: int) -> tuple[float, float, float]:
+        """The curve of a task's confidence at a decision point."""
+        of = self._info.stopping.get(task)
+        if of is None:
+            return 0.0, 0.0, 0.0
+        return of.slopes[point], of.intercepts[point], of.doubts[point]
 
-    def _limits(self, doubts: bool) -> None:
-        """The limits of novelty and remoteness at the decision points; without doubts
-        no score is beyond them."""
-        info = self._info
-        novelty = info.novelty or Novelty((), ())
-        far = Remoteness((), (), ())
-        naming = 255
-        if not doubts:
-            never = (inf,) * self._last
-            novelty = Novelty(never, never)
-        for i, name in enumerate(info.tasks if doubts else ()):
-            stopping = info.stopping.get(name)
+    def _naming(self) -> int:
+        """The task that names things; `NOWHERE` where nothing is unknown."""
+        for i, name in enumerate(self._info.tasks if self._doubts else ()):
+            stopping = self._info.stopping.get(name)
             if stopping is not None and stopping.remoteness is not None:
-                naming = i
-                far = stopping.remoteness
-        limits = {
-            "typical": novelty.typical,
-            "novel": novelty.limits,
-            "remote": far.limits,
-            "middles": far.middles,
-            "slopes": far.slopes,
-        }
-        self.values |= {key: limit[-self._last :] for key, limit in limits.items()}
-        self.values |= {"naming": naming, "has_novelty": info.novelty is not None}
+                return i
+        return NOWHERE
+
+    def _limits(self) -> None:
+        """The scores of doubt, and their limits at the decision points."""
+        info = self._info
+        assert info.novelty is not None
+        naming = self._naming()
+        far = None
+        if naming != NOWHERE:
+            far = info.stopping[[*info.tasks][naming]].remoteness
+        doubts = []
+        for point in self._points:
+            limits = {
+                "typical": info.novelty.typical[point],
+                "novel": info.novelty.limits[point],
+            }
+            if far is not None:
+                limits["remote"] = far.limits[point]
+                limits["middle"] = far.middles[point]
+                limits["slope"] = far.slopes[point]
+            doubts.append(self._formula.doubt(point, limits))
+        self._formula.weigh_doubt(doubts[-1])
+        self._tables["doubts"] = doubts
+
+    def _ram(self) -> int:
+        """Bytes of RAM."""
+        size = self._sizes
+        zones = max(size["zones"], 1)
+        unsure = 2 * size["zones"] + 3 + size["joints"]
+        row = 40 + 8 * max(size["joints"], 1) + 121 * zones + 8 * unsure
+        row += 4 * max(size["cells"], 1) + 4 * max(size["kernel_cells"], 1)
+        answer = 10 * size["labels"] + 10 * size["neighbours"] + 8
+        return (
+            4 * row
+            + 48 * unsure
+            + 9 * self._layout.alive.size
+            + size["points"] * (8 * size["values"] + 240 * size["channels"])
+            + 8 * (size["width"] + size["summed"] + size["nearest"])
+            + size["tasks"] * (answer + 8 * size["labels"] + 64)
+            + (4 * size["spaces"] + 12) * size["components"]
+            + REST_OF_RAM
+        )
 
 
-def write_rooms(rooms: Path, folder: Path, values: Mapping[str, str]) -> None:
-    """Write all files of C of a folder with these values, whole or not at all."""
+def digests(header: Sequence[int]) -> str:
+    """The digests of a header as numbers of C."""
+    return ", ".join(f"0x{digest:08x}u" for digest in header[1:3])
+
+
+def program(layout: SkinLayout) -> int:
+    """Which program a model needs: of a skin of this shape, with these quantities."""
+    shape = [int(getattr(layout, name)) for name in OF_PROGRAM]
+    return zlib.crc32(repr((shape, quantities_in_c())).encode())
+
+
+def write_rooms(
+    rooms: Path,
+    folder: Path,
+    values: Mapping[str, str],
+    more: Mapping[str, bytes] | None = None,
+) -> None:
+    """Write all files of C of a folder with these values, and more, whole or not at
+    all."""
+    contents = {
+        room.name: string.Template(room.read_text()).substitute(values).encode()
+        for room in rooms.glob("*.[ch]")
+    }
     with ExitStack() as files:
-        for room in rooms.glob("*.[ch]"):
-            text = string.Template(room.read_text()).substitute(values)
-            file = files.enter_context(write_whole(folder / room.name))
-            file.write(text.encode())
+        for name, data in (contents | dict(more or {})).items():
+            file = files.enter_context(write_whole(folder / name))
+            file.write(data)
             file.flush()
 
 
@@ -411,7 +499,7 @@ def checksum(model: Model) -> int:
     and of the outputs for features that are all `PROBE`, at the full window."""
     last = max(len(model.decision_points_s) - 1, 0)
     values = model.run(np.full((1, model.info.width), PROBE), last)
-    ends = ENDS[:3]
+    ends = ("label", "distances")
     names = [f"{task}_{end}" for task in model.info.tasks for end in ends]
     numbers = [PROBE * i for i in range(1, PROBES + 1)]
     probes = [f(x) for x in numbers for f in (sin, log, logistic, math.sqrt)]
@@ -429,7 +517,8 @@ def literal(value: object) -> str:
     if isinstance(value, Iterable):
         return f"{{{', '.join(map(literal, value)) or '0'}}}"
     if not isinstance(value, float | np.floating):
-        return str(int(value))  # type: ignore[call-overload]
+        number = int(value)  # type: ignore[call-overload]
+        return f"{number}u" if number > 2**31 else str(number)
     if np.isnan(value):
         return "(double)NAN"
     if np.isinf(value):
@@ -442,10 +531,9 @@ def array(kind: str, values: Iterable[object]) -> str:
     return f"(const {kind}[]){literal(values)}"
 
 
-def quoted(text: str) -> str:
-    """A text as a literal of C: ASCII, and other bytes of UTF-8 by their numbers."""
-    letters = text.encode().decode("latin-1")
-    return '"' + SPECIAL.sub(lambda match: f"\\{ord(match[0]):03o}", letters) + '"'
+def codes() -> list[str]:
+    """The names of all quantities in C, in the order of their numbers."""
+    return [of.code for of in (*ALONE.values(), *OF_ZONES.values())]
 
 
 def quantities_in_c() -> dict[str, str]:
@@ -453,7 +541,7 @@ def quantities_in_c() -> dict[str, str]:
     `export/c/samples.c`."""
     quantities = [*ALONE.values(), *OF_ZONES.values()]
     cases = [f"case {of.code}: return {of.c};" for of in quantities if of.c]
-    names = ", ".join(of.code for of in quantities)
+    names = ", ".join(codes())
     return {"quantity_names": names, "sure_values": " \\\n  ".join(cases)}
 
 
@@ -473,18 +561,6 @@ def lacks(info: ModelInfo) -> Iterable[str]:
         samples = feature.samples or info.samples
         if feature.summary not in ("", "rate") and samples > MOST_SUMMED:
             yield f"{feature.name} sums up more than {MOST_SUMMED} samples"
-
-
-def kernel_fields(table: KernelTable) -> list[object]:
-    """The `ec_kernels` of a table, which may be empty."""
-    mixed = mixes(len(table.shifts)) if table.shifts else ()
-    flat = [n for mix in mixed for n in (mix.sum(), *np.flatnonzero(mix))]
-    return [
-        array("int8_t", table.shifts),
-        array("int32_t", table.biases),
-        array("uint8_t", flat),
-        BIASES.get(len(table.biases), ()),
-    ]
 
 
 def _of_taxels(layout: SkinLayout, cells: Cells) -> Array:

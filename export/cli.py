@@ -125,22 +125,28 @@ def run(arguments: argparse.Namespace) -> int:
         if former is not None:
             suited(former, recording, str(file))
     with single_thread(), on_cluster(arguments.cluster):
-        fitted = _fit(arguments)
-        from export.api import measure, save  # loads ONNX
-
-        path = arguments.out / "model.onnx"
-        size = save(path, fitted, arguments.name, partial(_write_c, arguments))
-        prices = measure(fitted) if arguments.verbose or arguments.report else []
-        _tell(fitted, prices, verbose=arguments.verbose)
-        print(f"{path} ({size / 1024:.0f} kB)\n{path.with_name('golden.npz')}")
-        if arguments.report:
-            from train.report.model_report import write  # loads matplotlib
-
-            jobs = FitOptions(jobs=arguments.jobs).processes
-            print(write(arguments.out, fitted, Model(path), prices, jobs))
+        model = _write(arguments, _fit(arguments))
         if held_out:
-            print(held_out_text(Model(path), former, held_out), file=sys.stderr)
+            print(held_out_text(model, former, held_out), file=sys.stderr)
     return 0
+
+
+def _write(arguments: argparse.Namespace, fitted: Fitted) -> Model:
+    """Write the model and what is asked for beside it, and print what was fitted."""
+    from export.api import measure, save  # loads skl2onnx, for two seconds
+
+    path = arguments.out / "model.onnx"
+    size = save(path, fitted, arguments.name, partial(_write_c, arguments))
+    prices = measure(fitted) if arguments.verbose or arguments.report else []
+    _tell(fitted, prices, verbose=arguments.verbose)
+    print(f"{path} ({size / 1024:.0f} kB)\n{path.with_name('golden.npz')}")
+    model = Model(path)
+    if arguments.report:
+        from train.report.model_report import write  # loads matplotlib
+
+        jobs = FitOptions(jobs=arguments.jobs).processes
+        print(write(arguments.out, fitted, model, prices, jobs))
+    return model
 
 
 def _tell(fitted: Fitted, prices: Prices, *, verbose: bool) -> None:

@@ -1,6 +1,6 @@
-"""A fitted model as one ONNX graph.
+"""A fitted model as one ONNX graph, through skl2onnx with our own converter.
 
-skl2onnx's k-NN walks the training rows in a Scan, which is slow, breaks ties by the
+skl2onnx's own k-NN walks the training rows in a Scan, which is slow, breaks ties by the
 class number and answers NaN with the first row's label. This graph takes all distances
 in one product of whole numbers, obeys the tie rule, and answers a vector that is not
 finite with label -1.
@@ -11,11 +11,13 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Sequence
 from functools import partial, reduce
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 import onnx
 from onnx import helper
+from skl2onnx import convert_sklearn, update_registered_converter
+from skl2onnx.common.data_types import DoubleTensorType, Int64TensorType
 
 from edge.arrays import Booleans, Floats, Integers
 from edge.decide.info import METADATA_KEY, ModelInfo
@@ -341,6 +343,40 @@ def _label_distances(
     build.node("Mul", distances, factors, output=f"{task}_label_distances")
 
 
+class _Converter:
+    """What skl2onnx asks of a converter, for the outputs of a model's metadata."""
+
+    def __init__(self, info: ModelInfo) -> None:
+        self._info = info
+
+    def parse(
+        self, scope: Any, model: Fitted, inputs: list[Any], custom_parsers: Any = None
+    ) -> Any:
+        """Declare the outputs; ONNX Runtime derives their sizes from the constants."""
+        operator = scope.declare_local_operator(type(model).__name__, model)
+        operator.inputs.extend(inputs)
+        for name, (element, shape) in self._info.outputs.items():
+            kind = Int64TensorType if element == "int64" else DoubleTensorType
+            variable = scope.declare_local_variable(name, kind([None, *shape]))
+            operator.outputs.append(variable)
+        return operator.outputs
+
+    def shapes(self, operator: Any) -> None:
+        """Keep the types with which `parse` declares the outputs."""
+
+    def convert(self, scope: Any, operator: Any, container: Any) -> None:
+        """Add the nodes and constants."""
+        build = Builder()
+        model = operator.raw_operator
+        if isinstance(model, ContactClassifier | SequentialClassifier):
+            _nearest_trials(build, model, self._info.has_label_distances)
+        else:
+            model.add_nodes(build)
+        container.nodes.extend(build.made)
+        container.initializers.extend(build.constants.values())
+        container.node_domain_version_pair_sets.add(("", OPSET))
+
+
 def to_onnx(model: Fitted, info: ModelInfo) -> bytes:
     """The fitted tasks and the metadata as a checked, self-contained ONNX file.
 
@@ -348,36 +384,28 @@ def to_onnx(model: Fitted, info: ModelInfo) -> bytes:
     default is the last one, and for each task the output `<task>_label_distances` (n,
     labels); see `edge.decide.info`.
     """
-    build = Builder()
-    if isinstance(model, ContactClassifier | SequentialClassifier):
-        _nearest_trials(build, model, info.has_label_distances)
-    else:
-        model.add_nodes(build)
-    inputs = [_declared("features", "float64", [None, info.width])]
+    inputs: list[tuple[str, Any]] = [("features", DoubleTensorType([None, info.width]))]
     if info.decision_points_s:
-        inputs.append(_declared("decision_point", "int64", [1]))
-    outputs = [
-        _declared(name, kind, [None, *shape])
-        for name, (kind, shape) in info.outputs.items()
-    ]
-    constants = list(build.constants.values())
-    graph = helper.make_graph(build.made, "edge-classify", inputs, outputs, constants)
-    proto = helper.make_model(
-        graph,
-        opset_imports=[helper.make_opsetid("", OPSET)],
-        ir_version=IR_VERSION,
-        producer_name="edge-classify",
-        doc_string="scaler, PCA and k-NN of a touch; see the metadata",
+        inputs.append(("decision_point", Int64TensorType([1])))
+    kind = type(model)
+    converter = _Converter(info)
+    update_registered_converter(
+        kind,
+        kind.__name__,
+        converter.shapes,
+        converter.convert,
+        parser=converter.parse,
+        overwrite=True,
     )
+    proto = convert_sklearn(
+        model, name="edge-classify", initial_types=inputs, target_opset={"": OPSET}
+    )
+    proto.ir_version = IR_VERSION
+    proto.producer_name = "edge-classify"
+    proto.doc_string = "scaler, PCA and k-NN of a touch; see the metadata"
     helper.set_model_props(proto, {METADATA_KEY: to_json(info)})
     onnx.checker.check_model(proto, full_check=True)
     return with_digest(proto.SerializeToString(deterministic=True))
-
-
-def _declared(name: str, kind: str, shape: Sequence[int | None]) -> onnx.ValueInfoProto:
-    """An input or output."""
-    element = helper.np_dtype_to_tensor_dtype(np.dtype(kind))
-    return helper.make_tensor_value_info(name, element, shape)
 
 
 def with_digest(data: bytes) -> bytes:

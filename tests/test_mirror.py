@@ -6,6 +6,7 @@ import re
 from tests.conftest import ROOT
 
 THROUGH = {
+    "export/formula.py": "edge/decide/test_knn.py",
     "edge/app/commands/demo.py": "test_demo_data.py",
     "edge/decide/summary.py": "edge/app/commands/test_replay_verify.py",
     "edge/touch/contact.py": "edge/touch/test_track.py",

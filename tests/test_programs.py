@@ -12,7 +12,6 @@ from edge.errors import EdgeError
 from tests.checks import __main__ as checks
 from tests.checks import mutants
 from tests.checks.bench import tables
-from tests.checks.bench.program import start
 from tests.checks.bench.scale import rows_of
 from tests.checks.hard_cases import __main__ as hard_cases
 from tests.checks.hard_cases import elsewhere
@@ -24,19 +23,12 @@ from tests.conftest import ROOT
     [
         (hard_cases.measure, ["tyes"], "no case's name holds 'tyes'"),
         (elsewhere.measure, ["none", "python"], "no golden files are in none"),
-        (mutants.measure, [1, 1, "train"], "the rooms are skin, bus, "),
+        (mutants.measure, [["train"], 1, 1], "the rooms are skin, bus, "),
     ],
 )
 def test_options_that_would_measure_nothing_are_refused(measure, words, sentence):
     with pytest.raises(EdgeError, match=sentence):
         measure(*words)
-
-
-def test_a_number_of_nothing_is_refused(monkeypatch, capsys):
-    monkeypatch.setattr("sys.argv", ["faults", "--every", "0"])
-    with pytest.raises(SystemExit):
-        start(print, "", ("--every", 1, "every so many positions"))
-    assert "--every: must be a whole number from 1" in capsys.readouterr().err
 
 
 def test_what_grows_faster_than_its_bound_is_told():

@@ -1,5 +1,6 @@
 """Recordings to a fitted model: load, choose, calibrate, fit."""
 
+import logging
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -28,6 +29,7 @@ from train.notes import warnings
 from train.progress import Stage, stages
 from train.tune import Loaded, choosing_of, trials_of, window, windows_of
 
+LOG = logging.getLogger(__name__)
 FEWEST_TRIALS = 3
 MOST_CHOSEN = 1000
 """Trials that settings are chosen by; the model has all. Accuracy on unseen objects does
@@ -146,9 +148,9 @@ def load(
     if isinstance(data, DataSet):
         return Loaded(data, windows, [])
     paths = [data] if isinstance(data, str | Path) else data
-    every = read(paths, progress=options.progress, skip_damaged=options.skip_damaged)
-    recordings, notes = without_copies(every)
-    skipped = (f"warning: {error}; it is left out" for error in every.damaged)
+    readable = read(paths, progress=options.progress, skip_damaged=options.skip_damaged)
+    recordings, notes = without_copies(readable)
+    skipped = (f"warning: {error}; it is left out" for error in readable.damaged)
     notes = [*skipped, *notes]
     if options.fixed_window_s is None and not options.quick:
         seconds = [float(r.t[-1] - r.t[0]) for r in recordings.recordings]
@@ -216,6 +218,7 @@ def calibrate(
     names = settings.features(folds=True)
     dataset = measured.of(sorted(names))
     at_points = dataset.at_points(points, options.samples)
+    LOG.debug("calibrating by vectors (points, trials, columns) %s", at_points.shape)
     classifier = SequentialClassifier(
         settings.choices,
         points,

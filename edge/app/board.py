@@ -22,7 +22,7 @@ LEAST_FREE_MB = 200
 
 
 @dataclass(frozen=True)
-class Row:
+class Fact:
     """A fact about the machine, with a remedy where it will not do."""
 
     name: str
@@ -30,48 +30,48 @@ class Row:
     remedy: str = ""
 
 
-def look(root: Path = Path("/")) -> Iterator[Row]:
+def look(root: Path = Path("/")) -> Iterator[Fact]:
     """Everything that a board needs, row by row.
 
     Args:
         root: holds `dev` and `sys`.
     """
-    yield Row(
+    yield Fact(
         "program", f"edge-classify {__version__}; reads models of format {FORMAT}"
     )
     system = f"{platform.system()} {platform.release()}, {platform.machine()}"
-    yield Row("system", system)
-    yield Row("python", platform.python_version())
+    yield Fact("system", system)
+    yield Fact("python", platform.python_version())
     for package in PACKAGES:
         try:
-            yield Row(package, version(package))
+            yield Fact(package, version(package))
         except PackageNotFoundError:
             if package == "onnxruntime" and sys.maxsize <= 2**32:
                 note = "missing; numpy runs the models on this 32-bit system"
-                yield Row(package, note)
+                yield Fact(package, note)
             else:
-                yield Row(package, "missing", f"run `pip install {package}`")
+                yield Fact(package, "missing", f"run `pip install {package}`")
     yield from _devices(root)
     yield from _state()
 
 
-def _state() -> Iterator[Row]:
+def _state() -> Iterator[Fact]:
     """Clock, load and disk."""
     # A board without a battery for its clock starts in the past.
     behind = time.time() < Path(__file__).stat().st_mtime
     utc = time.strftime("%Y-%m-%d %H:%M UTC", time.gmtime())
     set_clock = "set the clock: `sudo timedatectl set-ntp true`"
-    yield Row("clock", utc, set_clock if behind else "")
+    yield Fact("clock", utc, set_clock if behind else "")
     load = os.getloadavg()[0]
     cores = os.cpu_count() or 1
     busy = "end other programs: they delay the frames" if load > cores else ""
-    yield Row("load", f"{load:.1f} on {cores} cores", busy)
+    yield Fact("load", f"{load:.1f} on {cores} cores", busy)
     free_mb = shutil.disk_usage(Path.cwd()).free // 1_000_000
     full = "delete old recordings and maps" if free_mb < LEAST_FREE_MB else ""
-    yield Row("disk", f"{free_mb} MB free in this folder", full)
+    yield Fact("disk", f"{free_mb} MB free in this folder", full)
 
 
-def _devices(root: Path) -> Iterator[Row]:
+def _devices(root: Path) -> Iterator[Fact]:
     """I2C buses and serial ports, and whether this user may open them."""
     absent = True
     for pattern, group in GROUPS.items():
@@ -79,7 +79,7 @@ def _devices(root: Path) -> Iterator[Row]:
             absent = False
             yield _device(root, device, group)
     if absent:
-        yield Row(
+        yield Fact(
             "/dev/i2c-*",
             "no I2C bus and no serial port",
             "switch I2C on (`sudo raspi-config`, or `sudo modprobe i2c-dev`), or plug "
@@ -87,7 +87,7 @@ def _devices(root: Path) -> Iterator[Row]:
         )
 
 
-def _device(root: Path, device: Path, group: str) -> Row:
+def _device(root: Path, device: Path, group: str) -> Fact:
     name = root / "sys/class/i2c-dev" / device.name / "name"
     adapter = f"{name.read_text().strip()}, " if name.exists() else ""
     owner = f"{adapter}group {_group(device.stat().st_gid)}"
@@ -96,7 +96,7 @@ def _device(root: Path, device: Path, group: str) -> Row:
         remedy = (
             f"may not be opened; run `sudo usermod -aG {group} $USER`, and log in again"
         )
-    return Row(f"/dev/{device.name}", owner, remedy)
+    return Fact(f"/dev/{device.name}", owner, remedy)
 
 
 def _group(number: int) -> str:

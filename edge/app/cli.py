@@ -51,7 +51,7 @@ def parser(names: Iterable[str] = COMMANDS) -> argparse.ArgumentParser:
         description="Tells from a robot's skin what the robot has touched.",
         epilog="`edge-classify COMMAND --help` explains a command. Commands print text to a "
         "terminal, and one JSON object per line to a pipe or a file. In a checkout of the "
-        "project, edge-classify export, import, simulate, study, tradeoff, show, split "
+        "project, edge-classify export, import, simulate, study, tradeoff, show "
         "and thresholds run the workstation's commands.",
     )
     top.add_argument(
@@ -61,8 +61,8 @@ def parser(names: Iterable[str] = COMMANDS) -> argparse.ArgumentParser:
     )
     for command in add_commands(top, {name: COMMANDS[name] for name in names}):
         flag = partial(command.add_argument, action="store_true")
-        flag("--json", help="print JSON lines even to a terminal")
-        flag("-q", "--quiet", help="print only errors to stderr")
+        flag("--json", help="JSON lines even to a terminal")
+        flag("-q", "--quiet", help="errors alone on stderr")
     return top
 
 

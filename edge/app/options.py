@@ -61,19 +61,13 @@ def add_skin(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--fake",
         metavar="REC.npz",
-        help="need no hardware: play this recording onto fake chips, as fast as "
-        "possible; without --skin, the chips are chosen to suit the recording",
+        help="recording to play onto fake chips, as fast as possible, in place of "
+        "hardware; without --skin, the chips are chosen to suit it",
     )
     parser.add_argument(
         "--loop",
         action="store_true",
-        help="play the recording over and over",
-    )
-    parser.add_argument(
-        "--seconds",
-        type=seconds,
-        default=math.inf,
-        help="stop after this time (default: never)",
+        help="endless repetition of the recording",
     )
 
 
@@ -86,9 +80,15 @@ def add_reading(parser: argparse.ArgumentParser, web: str = "") -> None:
     """
     add_skin(parser)
     parser.add_argument(
+        "--seconds",
+        type=seconds,
+        default=math.inf,
+        help="time after which to stop (default: never)",
+    )
+    parser.add_argument(
         "--joints",
         metavar="stdin|udp:[HOST:]PORT",
-        help='read joint angles as JSON lines {"t": seconds, "q": [radians]}; add '
+        help='joint angles as JSON lines {"t": seconds, "q": [radians]}; add '
         '"names": [joints] if they are not in the arm\'s order; without HOST, the port '
         'listens on the loopback interface; a line {"onset": true} begins a touch, for a '
         "model whose onsets come from outside",
@@ -98,7 +98,7 @@ def add_reading(parser: argparse.ArgumentParser, web: str = "") -> None:
         metavar="HOST:PORT",
         nargs="?",
         const="127.0.0.1:8000",
-        help="show the skin live on a page for a browser, by default at 127.0.0.1:8000; "
+        help="live page of the skin for a browser, by default at 127.0.0.1:8000; "
         f"open the link that is printed, with its token{web}",
     )
 
@@ -110,8 +110,8 @@ def add_error(parser: argparse.ArgumentParser) -> None:
         "--error",
         type=float,
         metavar="RATE",
-        help="decide as early as possible with at most this share of wrong labels (0.1: "
-        "one in ten); without it, decide at the end of the window",
+        help="greatest share of wrong labels (0.1: one in ten), with which each decision "
+        "comes as early as possible; without it, at the end of the window",
     )
 
 
@@ -163,12 +163,12 @@ def add_arm(parser: argparse.ArgumentParser, use: str) -> None:
     parser.add_argument(
         "--base",
         metavar="LINK",
-        help="in a URDF, the first link of the arm",
+        help="first link of the arm, in a URDF",
     )
     parser.add_argument(
         "--tip",
         metavar="LINK",
-        help="in a URDF, the link that carries the skin",
+        help="link that carries the skin, in a URDF",
     )
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import math
 import signal
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, ExitStack, contextmanager, nullcontext
@@ -109,7 +110,7 @@ def open_skin(
         raise InputError("give --skin skin.toml, or --fake REC.npz to use no hardware")
     else:
         skin = Skin.open(arguments.skin, calibrated=calibrated)
-        opened = Opened(skin, arguments.seconds, arguments.skin)
+        opened = Opened(skin, math.inf, arguments.skin)
     with opened.skin as skin:
         if model is not None:
             threshold_counts = for_device(
@@ -136,13 +137,12 @@ def _played(
         loop=arguments.loop,
         real_time=real_time,
     )
-    lasts_s = min(playback.ends, arguments.seconds)
     name = f"fake {arguments.fake}"
-    return Opened(skin, lasts_s, name, playback, virtual=not real_time)
+    return Opened(skin, playback.ends, name, playback, virtual=not real_time)
 
 
 @dataclass(frozen=True)
-class Reading:
+class Live:
     """A skin that is being read, with its loop, page and output.
 
     Attributes:
@@ -206,7 +206,7 @@ def reading(
     needs_joints: bool = True,
     real_time: bool = False,
     **page: Any,
-) -> Iterator[Reading]:
+) -> Iterator[Live]:
     """Read the skin that the options name, until a signal comes.
 
     Args:
@@ -245,11 +245,11 @@ def reading(
             opened.skin,
             joints=joints,
             onsets=_onsets(model, joints, opened),
-            lasts_s=opened.lasts_s,
+            lasts_s=min(opened.lasts_s, arguments.seconds),
             stop=stop,
         )
         live = stack.enter_context(_page(arguments.web, opened, loop, page))
-        yield Reading(opened, loop, stop, live, Output.of(arguments))
+        yield Live(opened, loop, stop, live, Output.of(arguments))
 
 
 def _page(

@@ -19,7 +19,7 @@ LEAD_S = 0.2
 """Time that a trial keeps from before its onset."""
 
 
-class Trials:
+class Segmenter:
     """Cuts a stream of frames into trials, one per contact.
 
     A trial lasts from the lead-in before onset to the end of the contact, or to

@@ -49,7 +49,7 @@ def agreed(
 
 def product_label(factors: Factors, indices: Mapping[str, int]) -> int | None:
     """The index of the product's label for the factors' labels (indices); None where
-    this pair was never met."""
+    this pair is unseen."""
     pairs = list(zip(*factors.values(), strict=True))
     pair = tuple(indices[factor] for factor in factors)
     return pairs.index(pair) if pair in pairs else None

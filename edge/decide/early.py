@@ -34,7 +34,7 @@ def policies(model: Model, error: float) -> Mapping[str, Policy]:
         if rule is None:
             policy_of[task] = Uncertified(model.info)
         else:
-            kind = Product if task in model.info.products else Early
+            kind = JointDecision if task in model.info.products else Early
             policy_of[task] = kind(model.info, task, rule, error)
     return policy_of
 
@@ -140,7 +140,7 @@ class Early:
         return answer.flagged(unsure=unsure, tie=False)
 
 
-class Product(Early):
+class JointDecision(Early):
     """Decide when both factors are, by their labels."""
 
     def answer(
@@ -160,7 +160,7 @@ class Product(Early):
 def paired(
     info: ModelInfo, candidate: Decided, decided: Mapping[str, Decided]
 ) -> Decided:
-    """The answer to a product by its factors' labels. A pair that was never met has no
+    """The answer to a product by its factors' labels. An unseen pair has no
     name, nor has one with an unknown factor."""
     task = info.tasks[candidate.task]
     indices = {}

@@ -1,6 +1,6 @@
 """What a model's file says beside its graph: its tasks, its features, and its calibration:
 how sure a decision is, when it may come early, and which contacts are unusual or of
-things that were never met."""
+unseen things."""
 
 from __future__ import annotations
 
@@ -66,7 +66,7 @@ class Task:
 class Novelty:
     """When a contact is unusual: unlike all in training, whatever the thing.
 
-    The graph scores every contact in a space of its own (`train.model.novelty`).
+    The outlier score of a contact is of a space of its own (`train.model.novelty`).
 
     Attributes:
         typical: (decision points,) scores that half of trained contacts exceed.
@@ -84,13 +84,13 @@ class Novelty:
 
 @dataclass(frozen=True)
 class Remoteness:
-    """When a thing is unknown: far from all in training by what tells things apart.
+    """When a thing is unknown: far from the known objects by what tells things apart.
 
     Attributes:
         limits: (decision points,) scores that few things in training exceed.
         middles: (decision points,) scores at which a thing is as likely known as not.
         slopes: (decision points,) by which the odds fall with the score's logarithm.
-        worth: shares of things that were left out, see `train.model.never_met`; empty
+        worth: shares of unseen things, see `train.model.never_met`; empty
             where none could be.
     """
 

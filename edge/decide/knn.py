@@ -23,7 +23,7 @@ class Constants:
     >>> from edge.decide import onnx_file
     >>> contents = onnx_file.read(demo.MODEL.read_bytes(), "the demo")
     >>> Constants(contents.constants, point=0).numbers("limits of space 0").item()
-    4194304.0
+    8388608.0
     """
 
     def __init__(self, arrays: Mapping[str, Array], point: int) -> None:

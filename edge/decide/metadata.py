@@ -5,8 +5,17 @@ import json
 from edge.decide.info import FORMAT, ModelInfo
 
 OPTIONAL = (
-    "decision_points_s stopping novelty joints kernels name trials usual speeds repeats "
-    "onset".split()
+    "decision_points_s",
+    "stopping",
+    "novelty",
+    "joints",
+    "kernels",
+    "name",
+    "trials",
+    "usual",
+    "speeds",
+    "repeats",
+    "onset",
 )
 """Keys that are left out where they would be empty."""
 

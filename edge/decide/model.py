@@ -51,9 +51,8 @@ class Decision(NamedTuple):
             agree.
         out_of_range: the features lie so far outside those of the training trials that
             the model cut them off; see `train.model.projection.Grid`.
-        novelty, remoteness: how unlike all training trials the features are, and how
-            far from all known things (see `edge.decide.info`), of a model with decision
-            points.
+        novelty, remoteness: the outlier score, and the distance to the known objects
+            (see `edge.decide.info`), of a model with decision points.
     """
 
     label: str
@@ -169,7 +168,8 @@ class Model:
                 f"{self.path}: has the decision points 0 to {last}, not {point}"
             )
         try:
-            outputs = self._scorer.score(vectors, point)
+            scored = self._scorer.score(vectors, point)
+            outputs = {name: scored[name] for name in self.info.outputs}
         # An index past its tensor, shapes that do not match, or a constant that lacks.
         except Exception as error:
             raise self._broken(printable(f"{type(error).__name__}: {error}")) from None

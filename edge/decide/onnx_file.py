@@ -8,19 +8,41 @@ of its size.
 
 import hashlib
 from collections import defaultdict
+from collections.abc import Iterator
 from dataclasses import dataclass, field
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
 from edge.arrays import Array
 from edge.errors import InputError
 
-OPERATORS = frozenset(
-    "Add ArgMax Cast Clip Div Gather GatherElements GatherND Gemm LessOrEqual MatMul Max "
-    "Mul Pad ReduceL1 ReduceMean ReduceSum ReduceSumSquare Round Sqrt Squeeze Sub TopK "
-    "Where".split()
-)
+OPERATORS = {
+    "Add",
+    "ArgMax",
+    "Cast",
+    "Clip",
+    "Div",
+    "Gather",
+    "GatherElements",
+    "GatherND",
+    "Gemm",
+    "LessOrEqual",
+    "MatMul",
+    "Max",
+    "Mul",
+    "Pad",
+    "ReduceL1",
+    "ReduceMean",
+    "ReduceSum",
+    "ReduceSumSquare",
+    "Round",
+    "Sqrt",
+    "Squeeze",
+    "Sub",
+    "TopK",
+    "Where",
+}
 """The operators of an exported model, all of the standard domain."""
 OPSET = 18
 """The version of ONNX's operators in an exported model."""
@@ -41,8 +63,6 @@ OPERATOR = 4
 ATTRIBUTES = 5
 DOMAIN = 7
 """Fields of a NodeProto."""
-WHOLE = 3
-"""Field of an attribute that is a whole number."""
 NUMBERS = frozenset({1, 2, 3, 4, 7, 8, 20})
 """Fields of an attribute that is a number, a text or several numbers, not a tensor or a
 graph."""
@@ -69,24 +89,16 @@ Message = dict[int, list[Any]]
 inner message. A damaged file may have one where the other belongs."""
 
 
-class Node(NamedTuple):
-    """A node of the graph."""
-
-    operator: str
-    inputs: list[str]
-    outputs: list[str]
-    attributes: dict[str, int]
-
-
 @dataclass
 class Contents:
-    """Nodes, constants and metadata of a model file."""
+    """Constants and metadata of a model file."""
 
     data: bytes
     """The whole file."""
     intact: bool = True
     """Whether its digest is there and right."""
-    nodes: list[Node] = field(default_factory=list)
+    nodes: int = 0
+    """How many there are."""
     constants: dict[str, Array] = field(default_factory=dict)
     """By their names."""
     metadata: dict[str, str] = field(default_factory=dict)
@@ -129,13 +141,9 @@ def messages(message: Message, number: int) -> list[Message]:
     return [message_of(value) for value in message.get(number, ())]
 
 
-def _texts(message: Message, number: int) -> list[str]:
-    return [str(value, "utf-8") for value in message.get(number, [])]
-
-
 def text_of(message: Message, number: int) -> str:
     """The last of a field's values, as protobuf takes them; empty without a value."""
-    return ["", *_texts(message, number)][-1]
+    return str(message.get(number, [b""])[-1], "utf-8")
 
 
 def read(data: bytes, name: str) -> Contents:
@@ -152,25 +160,29 @@ def read(data: bytes, name: str) -> Contents:
         raise InputError(f"{name}: {DAMAGED}")
     contents = Contents(data, intact)
     try:
-        model = message_of(memoryview(data))
-        if FUNCTIONS in model:
-            contents.foreign.append(UNUSUAL)
-        versions = [fields.get(2) for fields in messages(model, OPERATOR_SETS)]
-        if versions != [[OPSET]]:
-            contents.foreign.append(f"operators of another version than {OPSET}")
-        for entry in messages(model, METADATA):
-            contents.metadata[text_of(entry, 1)] = text_of(entry, 2)
-        for graph in messages(model, GRAPH):
-            _read_graph(graph, contents)
+        _read_model(message_of(memoryview(data)), contents)
     # A field that runs past its message or is of no known kind; a number in place of
     # bytes; a constant of an unknown type, or of another size than it says.
     except (LookupError, TypeError, ValueError):
-        contents.nodes.clear()
+        contents.nodes = 0
     if not contents.nodes:
         raise InputError(f"{name}: not an ONNX model; copy or export it again")
-    if len(contents.nodes) > MOST_NODES:
-        contents.foreign.append(f"{len(contents.nodes)} nodes")
+    if contents.nodes > MOST_NODES:
+        contents.foreign.append(f"{contents.nodes} nodes")
     return contents
+
+
+def _read_model(model: Message, contents: Contents) -> None:
+    """Take in the metadata and the graph."""
+    if FUNCTIONS in model:
+        contents.foreign.append(UNUSUAL)
+    versions = [fields.get(2) for fields in messages(model, OPERATOR_SETS)]
+    if versions != [[OPSET]]:
+        contents.foreign.append(f"operators of another version than {OPSET}")
+    for entry in messages(model, METADATA):
+        contents.metadata[text_of(entry, 1)] = text_of(entry, 2)
+    for graph in messages(model, GRAPH):
+        _read_graph(graph, contents)
 
 
 def _read_graph(graph: Message, contents: Contents) -> None:
@@ -178,7 +190,8 @@ def _read_graph(graph: Message, contents: Contents) -> None:
     if SPARSE in graph:
         contents.foreign.append(UNUSUAL)
     for fields in messages(graph, NODES):
-        _read_node(fields, contents)
+        contents.nodes += 1
+        contents.foreign.extend(_foreign_of_node(fields))
     for tensor in messages(graph, INITIALIZERS):
         if EXTERNAL_DATA in tensor or any(tensor.get(DATA_LOCATION, ())):
             contents.foreign.append("weights in another file")
@@ -191,21 +204,15 @@ def _read_graph(graph: Message, contents: Contents) -> None:
         contents.foreign.append(f"an input {name}")
 
 
-def _read_node(fields: Message, contents: Contents) -> None:
+def _foreign_of_node(fields: Message) -> Iterator[str]:
+    """What of a node no exported model has."""
     domain = text_of(fields, DOMAIN)
     operator = text_of(fields, OPERATOR)
     if domain not in ("", "ai.onnx") or operator not in OPERATORS:
-        contents.foreign.append(f"operator {domain}.{operator}".replace(" .", " "))
-    attributes = {}
+        yield f"operator {domain}.{operator}".replace(" .", " ")
     for attribute in messages(fields, ATTRIBUTES):
         if not attribute.keys() <= NUMBERS:
-            contents.foreign.append(UNUSUAL)
-        if WHOLE in attribute:
-            value = attribute[WHOLE][-1]
-            # Negative numbers are stored modulo 2^64.
-            attributes[text_of(attribute, 1)] = value - (value >> 63 << 64)
-    inputs = _texts(fields, 1)
-    contents.nodes.append(Node(operator, inputs, _texts(fields, 2), attributes))
+            yield UNUSUAL
 
 
 def check(contents: Contents, name: str) -> None:

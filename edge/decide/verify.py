@@ -15,7 +15,7 @@ by.
 | `novelty`, `remoteness` | float64 (v,) | likewise |
 | `out_of_range` | float64 (v,) | the graph's output |
 | `decision_point_vectors` | float64 (points, w, width) | vectors for each decision point |
-| `<task>_decision_point_label`, ... | | the graph's outputs for these, each at its point |
+| `decision_point_<task>_label`, ... | | the graph's outputs for these, each at its point |
 | `meta` | JSON text | `skin` |
 
 Every quantity must be equal, to the last bit. An engine that computes in float32 gives
@@ -41,11 +41,6 @@ from edge.record.recording import Recording
 from edge.touch.contact import FeatureSeries
 from edge.touch.layout import SkinLayout
 from edge.touch.track import first_contact
-
-OUTPUTS = ("label_distances", "label", "neighbours", "scores", "distances")
-"""Ends of the names of a task's outputs, of which a model may lack some."""
-OF_ALL_TASKS = ("novelty", "remoteness", "out_of_range")
-"""Outputs that belong to no task."""
 
 Line = tuple[str, Array, Array]
 """A quantity to compare: name, seen, expected."""
@@ -118,19 +113,6 @@ def verify(model: Model, path: str | os.PathLike[str]) -> list[Check]:
         return list(starmap(compared, lines))
 
 
-def _answered_key(key: str) -> str:
-    """The output that says whether an output's vectors are answered at all: a label,
-    which is -1 of those that are refused.
-
-    ONNX leaves open where NaN stands in an order, so that what follows from a vector
-    that is not finite may differ.
-    """
-    for end in OUTPUTS:
-        if key.endswith(f"_{end}"):
-            return key.removesuffix(end) + "label"
-    return key
-
-
 def _trials(arrays: dict[str, Array], meta: dict[str, Any]) -> Iterator[Recording]:
     keys = [key for key in ("t", "frames", "joints", "valid", "shear") if key in arrays]
     for first, end in pairwise(arrays["start"].tolist()):
@@ -185,47 +167,19 @@ def _graph(
                 f"takes {model.info.width} features; export both together"
             )
     for key, answer in answers(model, arrays).items():
-        label = _answered_key(key)
-        if key != label:
-            refused = arrays[label] < 0
-            answer = answer.copy()
-            answer[refused] = arrays[key][refused]
         yield key, answer, arrays[key]
 
 
 def answers(model: Model, arrays: Mapping[str, Array]) -> dict[str, Array]:
     """{key: the graph's output} for the vectors of a golden file, each at its decision
     point."""
-    outputs = _outputs(model, arrays["vectors"])
-    results = _named(model, outputs, "")
+    results = _outputs(model, arrays["vectors"])
     if model.info.decision_points_s:
         rows = enumerate(arrays["decision_point_vectors"])
         points = [_outputs(model, vectors, point) for point, vectors in rows]
-        stacked = {key: np.stack([p[key] for p in points]) for key in points[0]}
-        results |= _named(model, stacked, "decision_point_")
+        for key in points[0]:
+            results[f"decision_point_{key}"] = np.stack([p[key] for p in points])
     return results
-
-
-def _named(
-    model: Model,
-    outputs: Mapping[str, Array],
-    prefix: str,
-) -> dict[str, Array]:
-    """Outputs as a golden file names them; the prefix tells its two kinds of vectors
-    apart."""
-    tasks = model.info.tasks
-    named = {
-        f"{task}_{prefix}{end}": outputs[f"{task}_{end}"]
-        for task in tasks
-        for end in OUTPUTS
-        if f"{task}_{end}" in outputs
-    }
-    # What follows from a vector that is not finite may differ.
-    answered = np.min([outputs[f"{task}_label"] for task in tasks], axis=0) >= 0
-    for end in OF_ALL_TASKS:
-        if end in outputs:
-            named[f"{prefix}{end}"] = np.where(answered, outputs[end], 0.0)
-    return named
 
 
 def _outputs(
@@ -233,11 +187,19 @@ def _outputs(
     vectors: Floats,
     decision_point: int | None = None,
 ) -> dict[str, Array]:
-    """The graph's outputs for vectors (n, width), asked one by one as on the board."""
+    """The model's outputs for vectors (n, width), asked one by one as on the board.
+
+    ONNX leaves open where NaN stands in an order. So what follows from a vector without
+    a label, as one that is not finite, is 0.
+    """
     vectors = np.ascontiguousarray(vectors, np.float64)
-    rows = range(len(vectors))
-    single = [model.run(vectors[i : i + 1], decision_point) for i in rows]
-    return {key: np.concatenate([row[key] for row in single]) for key in single[0]}
+    rows = [model.run(vector[None], decision_point) for vector in vectors]
+    outputs = {key: np.concatenate([row[key] for row in rows]) for key in rows[0]}
+    labels = {f"{task}_label" for task in model.info.tasks}
+    refused = np.min([outputs[label] for label in labels], axis=0) < 0
+    for key in outputs.keys() - labels:
+        outputs[key][refused] = 0
+    return outputs
 
 
 def compared(name: str, values: Array, expected: Array) -> Check:

@@ -18,11 +18,6 @@ from edge.record.thresholds import doubt, shear_doubt
 from edge.writing import write_whole
 
 LOG = logging.getLogger(__name__)
-OLDER = {
-    ".edge-classify-labels.json": "a change of labels that a former release did not finish",
-    ".edge-classify-deleted": "recordings that a former release deleted",
-}
-"""What former releases left in folders."""
 
 
 def save(
@@ -116,7 +111,7 @@ def listed(paths: Iterable[str]) -> list[Path]:
 def find(paths: Iterable[str]) -> list[Path]:
     """The files of `listed` that no table leaves out.
 
-    Warns of rows whose file is gone, and of what former releases left behind.
+    Warns of rows whose file is gone.
 
     Raises:
         InputError: a folder holds no recording, all are left out, or a table is damaged.
@@ -132,13 +127,12 @@ def find(paths: Iterable[str]) -> list[Path]:
         raise InputError(
             f"{table_of(files[0].parent).path}: leaves every recording out"
         )
-    warn_of_remains(files, table_of)
+    warn_of_gone(files, table_of)
     return out
 
 
-def warn_of_remains(files: Iterable[Path], table_of: Callable[[Path], Table]) -> None:
-    """Warn of rows in the tables of files whose own file is gone, and of what former
-    releases left in their folders."""
+def warn_of_gone(files: Iterable[Path], table_of: Callable[[Path], Table]) -> None:
+    """Warn of rows in the tables of files whose own file is gone."""
     for folder in dict.fromkeys(file.parent for file in files):
         table = table_of(folder)
         gone = [file for file in table.rows if not os.path.lexists(folder / file)]
@@ -148,9 +142,6 @@ def warn_of_remains(files: Iterable[Path], table_of: Callable[[Path], Table]) ->
                 f"{table.path}, line {table.rows[gone[0]].line}: there is no {gone[0]} "
                 f"here{others}; take the line out, or bring the file back"
             )
-        for name, what in OLDER.items():
-            if os.path.lexists(folder / name):
-                LOG.warning(f"{folder / name}: {what}; it is left alone")
 
 
 def recordings_in(folder: Path) -> list[Path]:

@@ -110,13 +110,13 @@ static void move(ec_row *row, const double *joints) {
   for (uint32_t i = 0; i < 2; i++) {
     row->motions[i] = touched ? 0.0 : settled_motions[i];
   }
-  if (touched && EC_MOTION) {
+  if (touched && EC_MOST_MOTION) {
     int64_t taxels[EC_ZONE_WIDTH];
     ec_zone(EC_CONTACT, active, &region, 0, taxels);
     taxels[4] %= EC_COLS * taxels[2];
     row->motions[0] = distance(&ec_now.starts[0], taxels, joints);
   }
-  if (touched && EC_FORCE_MOTION) {
+  if (touched && EC_MOST_FORCE_MOTION) {
     row->motions[1] = distance(&ec_now.starts[1], row->zones[0], joints);
   }
 }
@@ -156,8 +156,8 @@ static void add(
     ec_zone((ec_zone_name)ec_zone_names[i], active, &region, counts, newest.zones[i]);
   }
   move(&newest, joints);
-  if (EC_CELLS) pool(counts, valid, ec_cell_of_taxel, newest.cells, EC_CELLS);
-  if (EC_KERNEL_CELLS) {
+  if (EC_MOST_CELLS) pool(counts, valid, ec_cell_of_taxel, newest.cells, EC_CELLS);
+  if (EC_MOST_KERNEL_CELLS) {
     pool(counts, valid, ec_kernel_cell_of_taxel, newest.kernel_cells, EC_KERNEL_CELLS);
   }
   for (uint32_t i = EC_JOINTS; i-- > 0;) newest.joints[i] = joints ? joints[i] : EC_NAN;

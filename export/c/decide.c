@@ -11,16 +11,16 @@ typedef struct {
   bool is_first; /* of its contact */
 } ec_question;
 
-static ec_question questions[EC_POINTS]; /* of the last contact */
+static ec_question questions[EC_MOST_POINTS]; /* of the last contact */
 static uint32_t due;                     /* how many of them there are */
 static uint32_t asked;                   /* and how many have been taken up */
 static ec_question question;             /* the one that is worked at */
 static enum { IDLE, MEASURING, COMPUTING } phase;
 
-static ec_event answers[EC_TASKS]; /* that of a decided task stays */
-static int16_t agreed[EC_TASKS];   /* the labels in which the tasks agree; -1: refused */
-static double distances[EC_TASKS][EC_MOST_LABELS];
-static bool decided[EC_TASKS];
+static ec_event answers[EC_MOST_TASKS]; /* that of a decided task stays */
+static int16_t agreed[EC_MOST_TASKS];   /* the labels in which the tasks agree; -1: refused */
+static double distances[EC_MOST_TASKS][EC_MOST_LABELS];
+static bool decided[EC_MOST_TASKS];
 static uint32_t waiting; /* tasks */
 static bool announced;   /* whether the onset was */
 static double last_s;
@@ -48,23 +48,31 @@ static double margin(uint32_t index) {
 }
 
 static double excess(void) {
-  double typical = ec_typical[question.point];
-  double score = ec_arena[EC_PLACE_NOVELTY];
+  double typical = ec_model_now.doubts[question.point].typical;
+  double score = ec_scores_now.novelty;
   return score > typical && typical > 0.0 ? ec_log(score / typical) : 0.0;
 }
 
 /* Probability that the thing is one of those in training. */
 static double known(void) {
-  double score = ec_arena[EC_PLACE_REMOTENESS];
+  const ec_doubt *doubt = &ec_model_now.doubts[question.point];
+  double score = ec_scores_now.remoteness;
   if (score <= 0.0) return 1.0;
-  return ec_logistic(ec_slopes[question.point] * ec_log(ec_middles[question.point] / score));
+  return ec_logistic(doubt->slope * ec_log(doubt->middle / score));
 }
 
 /* The calibrated confidence of a task's label by a curve. */
-static double confidence(const ec_curve *curve, uint32_t index) {
-  double log_odds = curve->slope * margin(index) + curve->intercept;
-  return ec_logistic(log_odds - curve->doubt * excess());
+static double confidence(const double curve[3], uint32_t index) {
+  double log_odds = curve[0] * margin(index) + curve[1];
+  return ec_logistic(log_odds - curve[2] * excess());
 }
+
+/* Of a product's label, that of a factor. */
+static uint16_t index_of(const ec_task *task, uint32_t factor, uint32_t label) {
+  return ec_model_now.words[task->indices[factor] + label];
+}
+
+static bool is_product(const ec_task *task) { return task->indices[0] != EC_NOWHERE; }
 
 /* The nearest answer in which a product and its factors agree. */
 static void agree(uint32_t index) {
@@ -73,17 +81,17 @@ static void agree(uint32_t index) {
   uint32_t best = 0;
   for (uint32_t i = 0; i < task->labels; i++) {
     for (uint32_t f = 0; f < 2; f++) {
-      total[i] = total[i] + distances[task->factors[f]][task->indices[f][i]];
+      total[i] = total[i] + distances[task->factors[f]][index_of(task, f, i)];
     }
     if (total[i] < total[best]) best = i;
   }
   agreed[index] = (int16_t)best;
   for (uint32_t f = 0; f < 2; f++) {
     uint32_t factor = task->factors[f];
-    agreed[factor] = task->indices[f][best];
+    agreed[factor] = (int16_t)index_of(task, f, best);
     for (uint32_t i = 0; i < ec_tasks[factor].labels; i++) distances[factor][i] = EC_INFINITY;
     for (uint32_t i = 0; i < task->labels; i++) {
-      double *nearest = &distances[factor][task->indices[f][i]];
+      double *nearest = &distances[factor][index_of(task, f, i)];
       if (total[i] < *nearest) *nearest = total[i];
     }
   }
@@ -100,31 +108,33 @@ static uint16_t flag(bool holds, uint16_t bit) { return holds ? bit : 0; }
 /* The model's answer to a task, with the reasons to doubt it. */
 static void ask(uint32_t index, bool refused) {
   const ec_task *task = &ec_tasks[index];
+  const ec_answer *of_model = &ec_answers[index];
+  const ec_doubt *doubt = &ec_model_now.doubts[question.point];
   double window_s = ec_windows_s[question.point];
   ec_event answer = {EC_DECIDED_EVENT, question.t_s, question.onset_s, window_s, 0.0, 0, -1,
                      question.doubts, (uint8_t)index, EC_NOTHING};
   ec_event *a = &answers[index];
   *a = answer;
-  a->flags |= flag(refused || ec_arena[EC_PLACE_OUT_OF_RANGE] > 0.0, EC_OUT_OF_RANGE);
+  a->flags |= flag(refused || ec_scores_now.out_of_range, EC_OUT_OF_RANGE);
   if (refused) return;
-  double most = 0.0;
+  uint32_t most = 0;
   uint32_t ties = 0;
   for (uint32_t i = 0; i < task->labels; i++) {
-    double votes = ec_arena[task->places.scores + i];
+    uint32_t votes = of_model->votes[i];
     ties = votes > most ? 1 : ties + (votes == most);
     if (votes > most) most = votes;
   }
   a->label = agreed[index];
-  a->nearest = (uint32_t)ec_arena[task->places.neighbours];
-  a->flags |= flag(ec_arena[task->places.distances] == 0.0, EC_AS_TRAINED);
+  a->nearest = of_model->neighbours[0];
+  a->flags |= flag(of_model->distances[0] == 0.0, EC_AS_TRAINED);
   a->flags |= flag(ties > 1, EC_TIE);
   a->confidence = EC_NAN;
   if (!EC_HAS_NOVELTY) return;
-  double likely = confidence(&task->curves[question.point], index);
+  double likely = confidence(ec_model_now.places[question.point * EC_TASKS + index].curve, index);
   if (index == EC_NAMING) likely *= known();
   a->confidence = rounded(likely);
-  a->flags |= flag(ec_arena[EC_PLACE_NOVELTY] > ec_novel[question.point], EC_UNUSUAL);
-  if (index == EC_NAMING && ec_arena[EC_PLACE_REMOTENESS] > ec_remote[question.point]) withhold(a);
+  a->flags |= flag(ec_scores_now.novelty > doubt->novel, EC_UNUSUAL);
+  if (index == EC_NAMING && ec_scores_now.remoteness > doubt->remote) withhold(a);
 }
 
 /* The model's answers at the decision point to the tasks that wait; whether it refuses. */
@@ -132,14 +142,12 @@ static bool ask_all(void) {
   bool refused = false;
   for (uint32_t i = 0; i < EC_TASKS; i++) {
     const ec_task *task = &ec_tasks[i];
-    agreed[i] = (int16_t)ec_arena[task->places.label];
+    agreed[i] = ec_answers[i].label;
     refused = refused || agreed[i] < 0;
-    for (uint32_t j = 0; task->places.label_distances && j < task->labels; j++) {
-      distances[i][j] = ec_arena[task->places.label_distances + j];
-    }
+    for (uint32_t j = 0; j < task->labels; j++) distances[i][j] = ec_answers[i].label_distances[j];
   }
   for (uint32_t i = 0; i < EC_TASKS && !refused; i++) {
-    if (ec_tasks[i].indices[0]) agree(i);
+    if (is_product(&ec_tasks[i])) agree(i);
   }
   for (uint32_t i = 0; i < EC_TASKS; i++) {
     if (!decided[i]) ask(i, refused);
@@ -162,7 +170,7 @@ static bool stop_product(const ec_task *task, ec_event *a) {
   bool sure = f[0]->stopped_by == EC_CONFIDENCE && f[1]->stopped_by == EC_CONFIDENCE;
   int16_t pair = -1;
   for (uint32_t i = 0; i < task->labels; i++) {
-    bool matches = task->indices[0][i] == f[0]->label && task->indices[1][i] == f[1]->label;
+    bool matches = index_of(task, 0, i) == f[0]->label && index_of(task, 1, i) == f[1]->label;
     if (matches && pair < 0) pair = (int16_t)i;
   }
   if (pair < 0 || a->label < 0) {
@@ -183,9 +191,9 @@ static bool is_decided(uint32_t index) {
     a->flags |= EC_UNCERTIFIED;
     return question.point == EC_POINTS - 1;
   }
-  if (task->indices[0]) return stop_product(task, a);
+  if (is_product(task)) return stop_product(task, a);
   bool waits = a->flags & EC_UNUSUAL;
-  bool sure = confidence(&task->rule_curve, index) >= task->rule_confidence;
+  bool sure = confidence(task->rule_curve, index) >= task->rule_confidence;
   uint32_t last = waits ? EC_POINTS - 1 : task->rule_last;
   if (question.point < last && (waits || !sure)) return false;
   return stop(a, task, sure);
@@ -197,8 +205,7 @@ static int decide(ec_event *events) {
   bool refused = ask_all();
   for (uint32_t turn = 0; turn < 2 * EC_TASKS; turn++) {
     uint32_t i = turn % EC_TASKS;
-    bool is_product = ec_tasks[i].indices[0] != 0;
-    if (decided[i] || is_product != (turn >= EC_TASKS)) continue;
+    if (decided[i] || is_product(&ec_tasks[i]) != (turn >= EC_TASKS)) continue;
     if (!refused && !is_decided(i)) continue;
     events[count++] = answers[i];
     decided[i] = true;
@@ -228,15 +235,16 @@ bool ec_selftest(void) {
     double probes[4] = {ec_sin(x), ec_log(x), ec_logistic(x), ec_sqrt(x)};
     take_in(&sum, probes, 4);
   }
-  for (uint32_t i = 0; i < EC_WIDTH; i++) ec_arena[i] = EC_PROBE;
-  ec_graph_begin();
-  while (!ec_graph_slice(EC_POINTS - 1)) continue;
-  for (const ec_task *task = ec_tasks; task < ec_tasks + EC_TASKS; task++) {
-    take_in(&sum, ec_arena + task->places.label, 1);
-    take_in(&sum, ec_arena + task->places.scores, task->labels);
-    take_in(&sum, ec_arena + task->places.distances, task->k);
+  if (!ec_model_now.header) return false;
+  for (uint32_t i = 0; i < EC_WIDTH; i++) ec_vector[i] = EC_PROBE;
+  ec_formula_begin();
+  while (!ec_formula_slice(EC_POINTS - 1)) continue;
+  for (uint32_t i = 0; i < EC_TASKS; i++) {
+    double label = ec_answers[i].label;
+    take_in(&sum, &label, 1);
+    take_in(&sum, ec_answers[i].distances, ec_tasks[i].k);
   }
-  return sum == ec_checksum;
+  return sum == EC_NUMBER(checksum);
 }
 
 void ec_begin(void) {
@@ -245,6 +253,11 @@ void ec_begin(void) {
   phase = IDLE;
   asked = due;
   last_s = -EC_INFINITY;
+}
+
+ec_refusal ec_model(const void *address) {
+  ec_begin();
+  return ec_open(address);
 }
 
 bool ec_is_touched(void) { return ec_now.under_way && !ec_now.ended; }
@@ -263,6 +276,7 @@ int ec_push(
     ec_event events[EC_MOST_EVENTS]) {
   int count = 0;
   bool is_busy = phase == MEASURING || asked < due;
+  if (!ec_model_now.header) return EC_NO_MODEL;
   if (!(t_s >= last_s) || t_s - t_s != 0.0) return EC_BAD_TIME;
   for (uint32_t i = joints ? EC_DOF : 0; i-- > 0;) {
     if (!(joints[i] >= -1e6 && joints[i] <= 1e6)) return EC_BAD_JOINTS;
@@ -307,8 +321,8 @@ int ec_work(ec_event events[EC_MOST_EVENTS]) {
   } else if (phase == MEASURING) {
     if (!ec_vector_slice(question.point)) return 0;
     phase = COMPUTING;
-    ec_graph_begin();
-  } else if (phase == COMPUTING && ec_graph_slice(question.point)) {
+    ec_formula_begin();
+  } else if (phase == COMPUTING && ec_formula_slice(question.point)) {
     phase = IDLE;
     return decide(events);
   }

@@ -16,11 +16,11 @@ typedef struct {
 typedef struct {
   double t; /* of the last frame */
   run counts;
-  run joints[EC_AT_LEAST_1(EC_JOINTS)];
-  double angles[EC_AT_LEAST_1(EC_JOINTS)];
+  run joints[EC_AT_LEAST_1(EC_MOST_JOINTS)];
+  double angles[EC_AT_LEAST_1(EC_MOST_JOINTS)];
   bool beyond; /* an angle was beyond its limits */
   double longest_s; /* from a frame to the next */
-  double long_steps[EC_LONG_STEPS]; /* shorter ones do not matter */
+  double long_steps[EC_MOST_LONG_STEPS]; /* shorter ones do not matter */
   uint32_t longs;
   uint32_t frames;
 } history;

@@ -56,9 +56,25 @@ enum {
   EC_BUSY = -1,       /* a contact begins while the last is being measured: see ec_push */
   EC_BAD_TIME = -2,   /* time is not finite or goes back */
   EC_BAD_JOINTS = -3, /* an angle is not finite, or beyond a million radians */
+  EC_NO_MODEL = -4,   /* ec_model has accepted none */
 };
 
-#define EC_MOST_EVENTS (EC_TASKS + 2)
+#define EC_MOST_EVENTS (EC_MOST_TASKS + 2)
+
+typedef enum {
+  EC_ACCEPTED,
+  EC_NO_MODEL_THERE,  /* or one of another format, or at an address that no 8 divides */
+  EC_DAMAGED,         /* its digest is another */
+  EC_OF_ANOTHER_SKIN, /* it needs a program of its own, as export writes it */
+  EC_TOO_LARGE        /* for the memory of this program: likewise */
+} ec_refusal;
+
+/* Take up a model, before anything else: the bytes of model.bin, which are read where they lie, at a
+   multiple of 8; or ec_image. Forgets all. */
+ec_refusal ec_model(const void *address);
+
+/* The model in the program itself, for one image: model.c. */
+extern const void *const ec_image;
 
 /* Whether this program computes with the bits that it should, which options of a compiler change; call
    it before ec_begin. */
@@ -105,8 +121,10 @@ int ec_push_lines(
     const uint16_t *counts, const bool *valid, double t_s, const double *joints,
     double (*now_s)(void), ec_put put);
 
-extern const char *const ec_task_names[];
-extern const char *const *const ec_labels[]; /* of each task */
+/* Texts in UTF-8; a label of -1 has none. */
+const char *ec_task_name(uint32_t task);
+const char *ec_label(uint32_t task, int16_t label);
+const char *ec_model_name(void);
 
 #ifdef __cplusplus
 }

@@ -2,8 +2,7 @@
    transforms.py, kernels.py. It is made in slices. */
 #include "internal.h"
 
-/* Behind the vector, the arena is free until the graph is computed. */
-static double *const summed_up = ec_arena + EC_WIDTH;
+static double summed_up[EC_AT_LEAST_1(EC_MOST_SUMMED)];
 
 static double absolute(double x) { return x < 0.0 ? -x : x; }
 
@@ -138,7 +137,7 @@ static void convolve(const ec_kernels *kernels, uint32_t point) {
   int32_t *mixed = padded + MOST_REACH;
   uint32_t level = now.row / KERNELS;
   int32_t dilation = 1 << level;
-  uint32_t first = kernels == &ec_taxel_kernels ? EC_ZONE_CHANNELS : 0;
+  uint32_t first = kernels == ec_model_now.kernels ? EC_ZONE_CHANNELS : 0;
   for (int32_t s = 0; s < SAMPLES; s++) mixed[s] = 0;
   for (uint32_t count = *now.mix++; count > 0; count--) {
     const uint16_t *values = ec_channels[point][first + *now.mix++];
@@ -171,8 +170,8 @@ static void convolve(const ec_kernels *kernels, uint32_t point) {
 }
 
 static void begin_kernels(const ec_kernels *kernels) {
-  now.mix = kernels->mixes;
-  now.bias = kernels->biases;
+  now.mix = ec_model_now.bytes + kernels->mixes;
+  now.bias = ec_model_now.longs + kernels->biases;
   first_taps();
 }
 
@@ -180,19 +179,18 @@ static void begin_kernels(const ec_kernels *kernels) {
 void ec_vector_begin(void) {
   now.feature = 0;
   now.row = 0;
-  now.out = ec_arena;
+  now.out = ec_vector;
 }
 
-/* Make a part of the features of a decision point, at the arena's beginning; whether it was the
-   last. */
+/* Make a part of the features of a decision point, in ec_vector; whether it was the last. */
 bool ec_vector_slice(uint32_t point) {
   const ec_feature *feature = &ec_features[now.feature];
   uint32_t rows = DILATIONS * KERNELS;
   uint32_t step = 1;
   bool is_of_zones = feature->quantity == EC_Q_ZONE_KERNELS;
   bool is_of_taxels = feature->quantity == EC_Q_TAXEL_KERNELS;
-  if (EC_CHANNELS && (is_of_zones || is_of_taxels)) {
-    const ec_kernels *kernels = is_of_zones ? &ec_zone_kernels : &ec_taxel_kernels;
+  if (EC_MOST_CHANNELS && (is_of_zones || is_of_taxels)) {
+    const ec_kernels *kernels = &ec_model_now.kernels[is_of_zones];
     if (now.row == 0) begin_kernels(kernels);
     convolve(kernels, point);
   } else {

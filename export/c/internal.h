@@ -1,14 +1,16 @@
 /* What the rooms share. Data flows one way: region, contact, samples and doubts, features,
-   graph, decide. */
+   formula, decide. */
 #ifndef EC_INTERNAL_H
 #define EC_INTERNAL_H
 
 #include <float.h>
 #include <math.h>
 #include <stdbool.h>
+#include <stddef.h>
 #include <stdint.h>
 
 #include "edge_classify.h"
+#include "image.h"
 
 /* A sum that is fused with its product has other bits. gcc knows no pragma against it: where the
    processor has such an instruction for doubles, say that -ffp-contract=off is given. */
@@ -68,30 +70,30 @@ void ec_zone(
 /* What may be unknown in a frame, by its place in a row: the centroids of zones, along and around,
    then these. */
 enum {
-  EC_OF_STIFFNESS = 2 * EC_ZONES,
+  EC_OF_STIFFNESS = 2 * EC_MOST_ZONES,
   EC_OF_MOTION,
   EC_OF_FORCE_MOTION,
   EC_OF_JOINTS,
-  EC_UNSURE_VALUES = EC_OF_JOINTS + EC_JOINTS
+  EC_UNSURE_VALUES = EC_OF_JOINTS + EC_MOST_JOINTS
 };
 
 /* A frame of a contact. */
 typedef struct {
   double t; /* seconds from onset */
   double motions[2]; /* of the centroid, and of the force-weighted one */
-  double joints[EC_AT_LEAST_1(EC_JOINTS)];
-  int64_t zones[EC_AT_LEAST_1(EC_ZONES)][EC_ZONE_WIDTH];
-  uint32_t cells[EC_AT_LEAST_1(EC_CELLS)];
-  uint32_t kernel_cells[EC_AT_LEAST_1(EC_KERNEL_CELLS)];
+  double joints[EC_AT_LEAST_1(EC_MOST_JOINTS)];
+  int64_t zones[EC_AT_LEAST_1(EC_MOST_ZONES)][EC_ZONE_WIDTH];
+  uint32_t cells[EC_AT_LEAST_1(EC_MOST_CELLS)];
+  uint32_t kernel_cells[EC_AT_LEAST_1(EC_MOST_KERNEL_CELLS)];
   uint32_t area; /* 0 without contact */
   uint16_t peak;
   bool same; /* as the frame before it, bit for bit */
   /* samples.c fills in the others */
-  bool is_spread[EC_AT_LEAST_1(EC_ZONES)]; /* whether spreads are known */
-  double spreads[EC_AT_LEAST_1(EC_ZONES)][5];
+  bool is_spread[EC_AT_LEAST_1(EC_MOST_ZONES)]; /* whether spreads are known */
+  double spreads[EC_AT_LEAST_1(EC_MOST_ZONES)][5];
   double unsure[EC_UNSURE_VALUES]; /* not a number where not known */
-  double column[EC_AT_LEAST_1(EC_ZONES)]; /* of the centroid when it was last known */
-  double turns[EC_AT_LEAST_1(EC_ZONES)]; /* in columns, that are added to it */
+  double column[EC_AT_LEAST_1(EC_MOST_ZONES)]; /* of the centroid when it was last known */
+  double turns[EC_AT_LEAST_1(EC_MOST_ZONES)]; /* in columns, that are added to it */
 } ec_row;
 
 typedef struct {
@@ -125,8 +127,8 @@ uint16_t ec_close(uint32_t point);
 /* samples.c: the values of each course at the sample times of a decision point, and those of the
    channels of kernels */
 #define EC_SAMPLES_OF_KERNELS 120
-extern double ec_values[EC_POINTS][EC_AT_LEAST_1(EC_VALUES)];
-extern uint16_t ec_channels[EC_POINTS][EC_AT_LEAST_1(EC_CHANNELS)][EC_SAMPLES_OF_KERNELS];
+extern double ec_values[EC_MOST_POINTS][EC_AT_LEAST_1(EC_MOST_VALUES)];
+extern uint16_t ec_channels[EC_MOST_POINTS][EC_AT_LEAST_1(EC_MOST_CHANNELS)][EC_SAMPLES_OF_KERNELS];
 void ec_samples_begin(void);
 void ec_samples_take(ec_row *row, uint32_t first_point);
 void ec_samples_close(uint32_t point, ec_row *row);
@@ -140,141 +142,88 @@ uint16_t ec_doubts(const ec_row *row, double window_s);
 void ec_vector_begin(void);
 bool ec_vector_slice(uint32_t point);
 
-/* model.c: the skin and the arm */
-typedef struct {
-  double angle_deg;
-  double step_deg; /* to the next column */
-} ec_angle;
+/* image.c: the model, by the names of its numbers and tables */
+ec_refusal ec_open(const void *address);
+
+#define EC_NUMBER(name) (ec_model_now.header->numbers.name)
+#define EC_SIZE(name) (ec_model_now.header->sizes.name)
+#define EC_TRIALS (ec_model_now.header->trials)
+#define EC_RELEASE_S EC_NUMBER(release_s)
+#define EC_RADIUS_M EC_NUMBER(radius_m)
+#define EC_ROW0_Z_M EC_NUMBER(row0_z_m)
+#define EC_ALONG EC_NUMBER(along)
+#define EC_AROUND EC_NUMBER(around)
+#define EC_SCALE EC_NUMBER(scale)
+#define EC_WINDOW_S EC_NUMBER(window_s)
+#define EC_LONG_STEP_S EC_NUMBER(long_step_s)
+#define EC_FORCE_FLOOR EC_NUMBER(force_floor)
+#define EC_LENGTH_FLOOR EC_NUMBER(length_floor)
+#define EC_THRESHOLD_COUNTS EC_NUMBER(threshold_counts)
+#define EC_ONSET EC_NUMBER(onset)
+#define EC_COLUMN_ANGLES EC_NUMBER(column_angles)
+#define EC_DOF EC_NUMBER(dof)
+#define EC_LINKS EC_NUMBER(link_count)
+#define EC_DEBOUNCE EC_NUMBER(debounce)
+#define EC_REPEATS EC_NUMBER(repeats)
+#define EC_EARLY EC_NUMBER(early)
+#define EC_NAMING EC_NUMBER(naming)
+#define EC_POINTS EC_SIZE(points)
+#define EC_TASKS EC_SIZE(tasks)
+#define EC_SPACES EC_SIZE(spaces)
+#define EC_FEATURES EC_SIZE(features)
+#define EC_WIDTH EC_SIZE(width)
+#define EC_COURSES EC_SIZE(courses)
+#define EC_JOINTS EC_SIZE(joints)
+#define EC_LONG_STEPS EC_SIZE(long_steps)
+#define EC_CELLS EC_SIZE(cells)
+#define EC_KERNEL_CELLS EC_SIZE(kernel_cells)
+#define EC_ZONE_CHANNELS EC_SIZE(zone_channels)
+#define EC_CHANNELS EC_SIZE(channels)
+#define EC_HAS_NOVELTY (EC_MOST_HAS_NOVELTY && EC_SIZE(has_novelty))
+#define ec_angles ec_model_now.angles
+#define ec_links ec_model_now.links
+#define ec_limits ec_model_now.limits
+#define ec_alive ec_model_now.alive
+#define ec_zone_names ec_model_now.zone_names /* EC_NO_ZONE comes last */
+#define ec_cell_of_taxel ec_model_now.cell_of_taxel
+#define ec_kernel_cell_of_taxel ec_model_now.kernel_cell_of_taxel
+#define ec_courses ec_model_now.courses
+#define ec_features ec_model_now.features
+#define ec_windows_s ec_model_now.windows_s
+#define ec_tasks ec_model_now.tasks
+
+#define EC_READABLE(valid, i) (ec_alive[i] && (!(valid) || (valid)[i]))
 
 enum { EC_FIXED, EC_REVOLUTE, EC_CONTINUOUS, EC_PRISMATIC };
 
-typedef struct {
-  double axis[3];
-  double step[12]; /* before the motion: the first three rows of a transform */
-  double after[3]; /* the fixed step after it */
-  uint8_t kind;
-} ec_link;
-
-/* Of a joint that features are made of. */
-typedef struct {
-  double low;
-  double high;
-  double still_s; /* how long an angle stayed the same in training */
-} ec_limit;
-
-extern const ec_limit ec_limits[];
-extern const ec_angle ec_angles[];
-extern const ec_link ec_links[];
-extern const bool ec_alive[];
-#define EC_READABLE(valid, i) (ec_alive[i] && (!(valid) || (valid)[i]))
-extern const uint8_t ec_zone_names[]; /* EC_NO_ZONE comes last */
-extern const int16_t ec_cell_of_taxel[];
-extern const int16_t ec_kernel_cell_of_taxel[];
-
-/* model.c: the features, by the names of edge/features/names.py */
+/* The features, by the names of edge/features/names.py and quantities.py. */
+enum { EC_QUANTITIES };
 enum { EC_T_NONE, EC_T_LOG, EC_T_SQRT, EC_T_RELATIVE };
 enum { EC_S_, EC_S_RATE, EC_S_MEAN, EC_S_DEVIATION, EC_S_ROUGHNESS };
+enum { EC_DOUBLES, EC_FLOATS, EC_PALETTE }; /* types of series */
 
-/* A quantity of a zone at some times of the window; several features may be made of it. */
-typedef struct {
-  uint16_t samples;
-  uint16_t rows; /* cells or joints */
-  uint8_t zone; /* index in ec_zone_names */
-  uint8_t quantity;
-  uint32_t place; /* of the first in ec_values */
-} ec_course;
-
-typedef struct {
-  double floor; /* of the first transform, where it is a logarithm */
-  uint8_t course;
-  uint8_t quantity;
-  uint8_t transforms[3];
-  uint8_t summary;
-} ec_feature;
-
-typedef struct {
-  const int8_t *shifts; /* of each channel */
-  const int32_t *biases;
-  const uint8_t *mixes; /* of each convolution: how many channels, and which */
-  uint8_t biases_of_dilation[4];
-} ec_kernels;
-
-extern const ec_course ec_courses[];
-extern const ec_feature ec_features[];
-extern const ec_kernels ec_taxel_kernels;
-extern const ec_kernels ec_zone_kernels;
-
-/* model.c: the numbers of graph.c, each in the smallest type that holds it exactly. Of a palette, a
-   byte for each says which of some doubles it is. Rows of a packed matrix begin with the bits of a
-   number, and then have these. */
-typedef float float32_t;
-typedef double float64_t;
-enum { EC_INT8, EC_INT16, EC_INT32, EC_FLOAT32, EC_FLOAT64, EC_PALETTE, EC_PACKED };
-
-typedef struct {
-  const void *data;
-  const double *palette;
-  uint32_t stride; /* from a decision point to the next; 0 where they share the numbers */
-  uint16_t columns; /* of a packed matrix */
-  uint8_t type;
-  uint8_t shift; /* a packed number is so many times halved */
-} ec_table;
-
-#define EC_NOWHERE 65535
-
-/* A node of the graph. Places below EC_ARENA are in the arena; the others are tables. */
-typedef struct {
-  uint16_t inputs[5];
-  uint16_t outputs[3];
-  uint16_t sizes[4];
-  uint8_t operator;
-} ec_step;
-
-enum {
-  EC_ADD, EC_SUB, EC_MUL, EC_DIV, EC_MAX, EC_LESSOREQUAL, EC_WHERE, EC_CLIP, EC_ROUND, EC_SQUEEZE,
-  EC_SQRT, EC_GEMM, EC_MATMUL, EC_REDUCEL1, EC_REDUCESUM, EC_REDUCESUMSQUARE, EC_REDUCEMEAN,
-  EC_TOPK, EC_GATHER, EC_GATHERELEMENTS, EC_GATHERND, EC_PAD, EC_ARGMAX, EC_PROJECT, EC_FINITE
-};
-
-extern const ec_table ec_tables[];
-extern const ec_step ec_steps[];
-extern const double ec_windows_s[];
-
-/* model.c: the tasks, and places of the graph's outputs in the arena */
-typedef struct {
-  double slope;
-  double intercept;
-  double doubt;
-} ec_curve;
-
-typedef struct {
-  const ec_curve *curves; /* of each decision point */
-  ec_curve rule_curve;
-  double rule_confidence; /* above 1: a fixed window */
-  uint8_t rule_last;
-  bool has_rule;
-  struct {
-    uint32_t label, scores, distances, neighbours, label_distances; /* 0: none */
-  } places;
-  uint16_t labels;
-  uint16_t k;
-  const uint8_t *indices[2]; /* of a product: the factors' label of each label; or NULL */
-  uint8_t factors[2];
-} ec_task;
-
-extern const ec_task ec_tasks[];
-extern const double ec_typical[]; /* of each decision point */
-extern const double ec_novel[];
-extern const double ec_remote[];
-extern const double ec_middles[];
-extern const double ec_slopes[];
-extern const uint64_t ec_checksum; /* of the outputs for features that are all EC_PROBE */
 #define EC_PROBE 0.3
 #define EC_PROBES 8
 
-/* graph.c: edge/decide/graph.py */
-extern double ec_arena[EC_ARENA];
-void ec_graph_begin(void);
-bool ec_graph_slice(uint32_t point);
+/* formula.c */
+typedef struct {
+  int16_t label; /* -1: the vector is refused */
+  uint16_t votes[EC_AT_LEAST_1(EC_MOST_LABELS)];
+  uint16_t neighbours[EC_MOST_NEIGHBOURS + 1]; /* trials, from the nearest on */
+  double distances[EC_MOST_NEIGHBOURS + 1];
+  double label_distances[EC_AT_LEAST_1(EC_MOST_LABELS)];
+} ec_answer;
+
+typedef struct {
+  double novelty;
+  double remoteness;
+  bool out_of_range;
+} ec_scores;
+
+extern double ec_vector[EC_AT_LEAST_1(EC_MOST_WIDTH)];
+extern ec_answer ec_answers[EC_AT_LEAST_1(EC_MOST_TASKS)];
+extern ec_scores ec_scores_now;
+void ec_formula_begin(void);
+bool ec_formula_slice(uint32_t point);
 
 #endif

@@ -67,12 +67,12 @@ static void decision(const ec_event *event, double now_s, ec_put put) {
   const char *separator = "\"";
   pair("window_s", event->window_s, put);
   text(", \"task\": ", put);
-  quoted(ec_task_names[event->task], put);
+  quoted(ec_task_name(event->task), put);
   text(", \"label\": ", put);
   if (event->label < 0) {
     text("null", put);
   } else {
-    quoted(ec_labels[event->task][event->label], put);
+    quoted(ec_label(event->task, event->label), put);
   }
   pair("confidence", event->confidence, put);
   pair("latency_ms", 1e3 * (now_s - event->t_s), put);

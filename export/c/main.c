@@ -16,8 +16,7 @@ static void work(void) {
 }
 
 int main(void) {
-  if (!ec_selftest()) return 1;
-  ec_begin();
+  if (ec_model(ec_image) != EC_ACCEPTED || !ec_selftest()) return 1;
   while (scanf("%lf", &t_s) == 1) {
     for (int i = 0; i < EC_ROWS * EC_COLS; i++) {
       if (scanf("%hu", &counts[i]) != 1) return 1;

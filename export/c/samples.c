@@ -9,8 +9,8 @@
 #define CLOCK_ROUNDING_S 1e-6
 #define BITS 14
 
-double ec_values[EC_POINTS][EC_AT_LEAST_1(EC_VALUES)];
-uint16_t ec_channels[EC_POINTS][EC_AT_LEAST_1(EC_CHANNELS)][EC_SAMPLES_OF_KERNELS];
+double ec_values[EC_MOST_POINTS][EC_AT_LEAST_1(EC_MOST_VALUES)];
+uint16_t ec_channels[EC_MOST_POINTS][EC_AT_LEAST_1(EC_MOST_CHANNELS)][EC_SAMPLES_OF_KERNELS];
 
 typedef struct {
   double t; /* below 0: never known */
@@ -50,7 +50,7 @@ static void spread(const int64_t *zone, double values[5]) {
 }
 
 static double spread_of(ec_row *row, uint32_t zone, uint32_t i) {
-  if (!EC_SPREADS) return 0.0;
+  if (!EC_MOST_SPREADS) return 0.0;
   if (!row->is_spread[zone]) spread(row->zones[zone], row->spreads[zone]);
   row->is_spread[zone] = true;
   return row->spreads[zone][i];
@@ -104,14 +104,14 @@ static void complete(const state *before, ec_row *row) {
   for (uint32_t i = 0; ec_zone_names[i] != EC_NO_ZONE; i++) {
     const int64_t *zone = row->zones[i];
     double force = (double)zone[2];
-    bool is_there = zone[2] > 0 && EC_CENTROIDS;
+    bool is_there = zone[2] > 0 && EC_MOST_CENTROIDS;
     row->is_spread[i] = false;
     row->column[i] = before->row.column[i];
     row->turns[i] = before->row.turns[i];
     row->unsure[2 * i] = is_there ? (double)zone[3] / force : EC_NAN;
     row->unsure[2 * i + 1] =
         is_there ? unwrapped(&before->row, row, i, (double)zone[4] / force) : EC_NAN;
-    if (ec_zone_names[i] == EC_SKIN && EC_FORCE_MOTION) {
+    if (ec_zone_names[i] == EC_SKIN && EC_MOST_FORCE_MOTION) {
       row->unsure[EC_OF_STIFFNESS] =
           (force / EC_SCALE + EC_FORCE_FLOOR) / (row->motions[1] + EC_LENGTH_FLOOR);
     }
@@ -178,12 +178,13 @@ static void interpolate_unsure(span s, const known *last, double value, double *
 /* A channel of kernels, times a power of two and cut off. No sum of a skin that export accepts
    reaches 2^48, so that the product fits. */
 static uint16_t channel(const ec_row *row, int32_t index) {
-  bool of_zones = index < EC_ZONE_CHANNELS;
-  const ec_kernels *kernels = of_zones ? &ec_zone_kernels : &ec_taxel_kernels;
-  int32_t place = of_zones ? index : index - EC_ZONE_CHANNELS;
+  int32_t of_all_zones = (int32_t)EC_ZONE_CHANNELS;
+  bool of_zones = index < of_all_zones;
+  const ec_kernels *kernels = &ec_model_now.kernels[of_zones];
+  int32_t place = of_zones ? index : index - of_all_zones;
   int64_t x = of_zones ? row->zones[place / EC_ZONE_WIDTH][place % EC_ZONE_WIDTH]
                        : row->kernel_cells[place];
-  int8_t shift = kernels->shifts[place];
+  int8_t shift = (int8_t)ec_model_now.bytes[kernels->shifts + (uint32_t)place];
   x = shift > 0 ? x * ((int64_t)1 << shift) : x >> -shift;
   return (uint16_t)(x < (1 << BITS) - 1 ? x : (1 << BITS) - 1);
 }
@@ -192,8 +193,8 @@ static uint16_t channel(const ec_row *row, int32_t index) {
 static void hold_channels(uint32_t point, const ec_row *row, double until_s) {
   double step_s = ec_windows_s[point] / (EC_SAMPLES_OF_KERNELS - 1);
   uint32_t end = first_at(until_s, step_s, CLOCK_ROUNDING_S, EC_SAMPLES_OF_KERNELS);
-  uint32_t begin = EC_CHANNELS ? first_at(row->t, step_s, CLOCK_ROUNDING_S, end) : end;
-  for (int32_t c = 0; begin < end && c < EC_CHANNELS; c++) {
+  uint32_t begin = EC_MOST_CHANNELS ? first_at(row->t, step_s, CLOCK_ROUNDING_S, end) : end;
+  for (int32_t c = 0; begin < end && c < (int32_t)EC_CHANNELS; c++) {
     uint16_t value = channel(row, c);
     for (uint32_t i = begin; i < end; i++) ec_channels[point][c][i] = value;
   }
@@ -265,7 +266,7 @@ void ec_samples_begin(void) {
     felt.row.turns[i] = 0.0;
   }
   for (uint32_t point = 0; point < EC_POINTS; point++) {
-    for (uint32_t i = 0; i < EC_AT_LEAST_1(EC_VALUES); i++) ec_values[point][i] = 0.0;
+    for (uint32_t i = 0; i < EC_SIZE(values); i++) ec_values[point][i] = 0.0;
   }
 }
 

@@ -84,7 +84,7 @@ def test_every_quantity_from_raw_counts_on_has_the_bits_of_x86(
 ):
     """In one process, as its start takes long: shipped model, the tests' model, the
     hard cases."""
-    assert hard_golden.main(["--out", str(tmp_path)]) == 0
+    assert hard_golden.measure(tmp_path) == 0
     shutil.copytree(exported, tmp_path / "tests")
     (tmp_path / "demo").mkdir()
     shutil.copy(MODEL, tmp_path / "demo" / "model.onnx")

@@ -427,8 +427,8 @@ def sweeps(every):
         options = {"every": every, "overhead_s": overhead_s}
         for file in SKINS.values():
             for kind, fault in KINDS.items():
-                yield delayed(sweep)(f"one {kind}, frame", file, fault, **options)
-                name = f"one {kind}, set-up"
+                yield delayed(sweep)(f"{kind}, once in a frame", file, fault, **options)
+                name = f"{kind}, once in the set-up"
                 yield delayed(sweep)(name, file, fault, set_up=True, **options)
 
 

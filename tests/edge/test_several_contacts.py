@@ -23,7 +23,7 @@ from edge.touch.track import MAX_CONTACTS, ContactTracker
 from tests.conftest import ROOT, export, save_touches
 
 PLACES = [(row, col) for row in (0, 4, 8, 12) for col in (0, 6, 12, 18)]
-POINTS_S = (0.4, 0.8, 1.2)
+
 ERROR = 0.9
 AT_ONCE = 1e9
 """Questions a second that hold nothing back."""
@@ -97,15 +97,6 @@ def test_no_frame_asks_more_than_a_few_questions_and_the_answers_are_the_same(
     assert sum(isinstance(event, Decided) for _, event in spread) == len(
         answers_of(at_once)
     )
-
-
-def test_a_stream_that_ends_is_asked_about_all_that_is_due(early, monkeypatch):
-    """Decision points that have come are not passed over for the full window."""
-    spread, _ = decided(early, ERROR, stop=83)
-    monkeypatch.setattr("edge.decide.classifier.ASKED_A_SECOND", AT_ONCE)
-    at_once, _ = decided(early, ERROR, stop=83)
-    assert answers_of(at_once)
-    assert answers_of(spread) == answers_of(at_once)
 
 
 FIRST = """\

@@ -7,6 +7,7 @@ import subprocess
 from dataclasses import replace
 from itertools import cycle
 from pathlib import Path
+from types import MappingProxyType
 
 import numpy as np
 import pytest
@@ -27,6 +28,7 @@ from edge.record.saving import save
 from edge.touch.layout import SkinLayout
 from edge.wire.skin import file as skinfile
 from export import c_code, skin_code
+from export.image import record
 from tests.conftest import ROOT, ended, export, in_a_row, touch
 from tests.edge.decide.test_knn import hostile
 from tests.export.microcontroller import machine
@@ -259,15 +261,27 @@ def spelled(rng):
     return [*dict.fromkeys(names), *KERNELS]
 
 
-class NoGraph:
-    """In place of the graph of a model with other features."""
+class NoFormula:
+    """In place of the formula of a model with other features."""
 
-    steps = ()
-    tables = ()
+    spaces = trials = nearest = components = 0
+    projections = ()
+    work = MappingProxyType({})
 
-    def __init__(self, model, outputs, points, arena):
-        self.arena = arena
-        self.places = {}
+    def __init__(self, model, points, pools):
+        pass
+
+    def task(self, task):
+        return {}
+
+    def place(self, task, point, curve):
+        return record("ec_place")
+
+    def doubt(self, point, limits):
+        return record("ec_doubt")
+
+    def weigh_doubt(self, doubt):
+        pass
 
 
 def measuring(layout, features, **changes):
@@ -286,7 +300,7 @@ def measuring(layout, features, **changes):
 
 def assert_same_vectors(model, recordings, folder, monkeypatch):
     """The C of a model makes the vectors of Python."""
-    monkeypatch.setattr(c_code, "CompiledGraph", NoGraph)
+    monkeypatch.setattr(c_code, "Formula", NoFormula)
     c_code.export(model, folder)
     questions = [
         machine.about_recording(machine.VECTORS_OF_RECORDING, r) for r in recordings
@@ -345,7 +359,7 @@ def test_the_sketch_suits_the_headers_with_a_model_and_without(tmp_path, monkeyp
     model = Model(demo.MODEL)
     skin = skinfile.load(skinfile.shipped("electrodes"))
     model.info = replace(model.info, layout=SkinLayout(*skin.layout.shape))
-    monkeypatch.setattr(c_code, "CompiledGraph", NoGraph)
+    monkeypatch.setattr(c_code, "Formula", NoFormula)
     for name in ("Wire.h", "EEPROM.h"):
         shutil.copy(ROOT / "tests" / "arduino.h", tmp_path / name)
     skin_code.export(skin, tmp_path)
@@ -420,7 +434,7 @@ def test_options_that_change_bits_do_not_compile(tmp_path):
     c_code.export(Model(demo.MODEL), tmp_path)
     options = "-ffast-math -funsafe-math-optimizations -ffinite-math-only -mfma"
     for option in options.split():
-        words = ["gcc", option, "-c", "graph.c", "-o", "graph.o"]
+        words = ["gcc", option, "-c", "formula.c", "-o", "formula.o"]
         ended = subprocess.run(words, cwd=tmp_path, capture_output=True, check=False)
         assert b"#error" in ended.stderr
 

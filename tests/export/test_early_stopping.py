@@ -26,9 +26,6 @@ from train.data.dataset import load_trials
 from train.model.pipeline import Choice
 from train.model.stopping import EarlySettings
 
-LABELS = {"t": np.array(["a", "b", "c"] * 15), "u": np.array(["x", "y", "y"] * 15)}
-"""Labels of 45 trials for two tasks."""
-
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
@@ -58,33 +55,33 @@ def decided(model, recording, error):
     return {event.task: event for event in events if isinstance(event, Decided)}
 
 
-@pytest.fixture(scope="module")
-def with_early_settings(early, tmp_path_factory):
-    """Vectors, and a model whose tasks take other features before 1.2 s."""
-    rng = np.random.default_rng(3)
-    X = rng.normal(size=(3, 45, early.info.width))
-    choices = {
-        "t": Choice("none", 4, 3, features=FEATURES[:2]),
-        "u": Choice("none", 3, 3, "lda", features=FEATURES),
-    }
-    area = FEATURES[1:2]
-    at_first = {
-        "t": Choice("IV", 6, 3, features=area),
-        "u": Choice("IV", 2, 3, features=area),
-    }
-    settings = EarlySettings(at_first, [at_first] * 10)
-    path = tmp_path_factory.mktemp("early") / "model.onnx"
-    return X, fitted_model(path, early.info, choices, X, LABELS, settings)[1]
-
-
-def test_a_far_feature_matters_only_where_a_decision_point_takes_it(
-    with_early_settings,
-):
-    X, model = with_early_settings
+def test_a_far_feature_matters_only_where_a_decision_point_takes_it(early, tmp_path):
+    X = np.random.default_rng(3).normal(size=(3, 45, early.info.width))
+    choices = {"t": Choice("none", 4, 3, features=FEATURES)}
+    at_first = {"t": Choice("IV", 6, 3, features=FEATURES[1:2])}
+    _, model = fitted_model(
+        tmp_path / "model.onnx",
+        early.info,
+        choices,
+        X,
+        {"t": np.array(["a", "b", "c"] * 15)},
+        EarlySettings(at_first, [at_first] * 10),
+    )
     far = X[0, :1].copy()
     far[0, 0] = 1e6
     outside = [model.run(far, point)["out_of_range"].tolist() for point in range(3)]
     assert outside == [[0.0], [0.0], [1.0]]
+
+
+@pytest.fixture
+def change(early, monkeypatch):
+    """Changes what the model says of a task's stopping."""
+
+    def change(task, **changes):
+        changed = replace(early.info.stopping[task], **changes)
+        monkeypatch.setitem(early.info.stopping, task, changed)
+
+    return change
 
 
 def test_a_stream_that_ends_before_any_rule_is_sure_is_decided_at_its_end(
@@ -96,69 +93,42 @@ def test_a_stream_that_ends_before_any_rule_is_sure_is_decided_at_its_end(
 
 
 def test_a_task_that_is_never_sure_waits_for_the_last_decision_point_of_its_rule(
-    early,
-    make_touch,
-    monkeypatch,
-    error,
+    early, make_touch, change, error
 ):
     rule = replace(stopping_rules(early, error)["category"], confidence=2.0, last=1)
-    waits = replace(early.info.stopping["category"], rules=(rule,))
-    monkeypatch.setitem(early.info.stopping, "category", waits)
+    change("category", rules=(rule,))
     category = decided(early, make_touch(seed=50), error)["category"]
     assert category.window_s == early.decision_points_s[1]
     assert category.stopped_by == "window"
     assert category.error == error
 
 
-@pytest.fixture
-def uncertified(early, monkeypatch):
-    """The model, with no certified rule for object."""
-    stopping = early.info.stopping["object"]
-    never = replace(stopping, rules=(replace(stopping.rules[0], error=1.0),))
-    monkeypatch.setitem(early.info.stopping, "object", never)
-    return early
-
-
 @pytest.mark.parametrize("seed", range(50, 56))
 def test_a_task_without_a_certified_rule_is_decided_as_without_an_error_rate(
-    uncertified,
-    make_touch,
-    error,
-    seed,
+    early, make_touch, change, error, seed
 ):
+    change("object", rules=())
     touch = make_touch(kind=("hard", "soft")[seed % 2], seed=seed)
-    limited = decided(uncertified, touch, error)["object"]
-    plain = decided(uncertified, touch, None)["object"]
-    assert limited.label == plain.label
-    assert limited.confidence == plain.confidence
-    assert limited.window_s == plain.window_s
+    limited, plain = (decided(early, touch, rate)["object"] for rate in (error, None))
     assert {*limited.flags} == {*plain.flags, "uncertified"}
+    for name in ("label", "confidence", "window_s"):
+        assert getattr(limited, name) == getattr(plain, name)
 
 
 @pytest.fixture
-def hasty(early, monkeypatch):
+def hasty(early, change):
     """The model that stops at the first decision point, and its smallest error."""
-    smallest = []
-    for task, stopping in early.info.stopping.items():
-        rule = replace(stopping.rules[0], confidence=0.0)
-        hurried = replace(stopping, rules=(rule,))
-        monkeypatch.setitem(early.info.stopping, task, hurried)
-        smallest.append(rule.error)
-    return early, max(smallest)
+    rules = {task: of.rules[0] for task, of in early.info.stopping.items()}
+    for task, rule in rules.items():
+        change(task, rules=(replace(rule, confidence=0.0),))
+    return early, max(rule.error for rule in rules.values())
 
 
-@pytest.fixture
-def strange(make_touch):
-    """A touch unlike all others."""
-    ordinary = make_touch(kind="hard", seed=50)
-    return replace(ordinary, frames=np.minimum(ordinary.frames.astype(int) * 40, 65535))
-
-
-def test_a_touch_unlike_all_others_waits_and_is_flagged_as_unusual(
-    hasty, make_touch, strange
-):
+def test_a_touch_unlike_all_others_waits_and_is_flagged_as_unusual(hasty, make_touch):
     model, error = hasty
     ordinary = make_touch(kind="hard", seed=50)
+    counts = np.minimum(ordinary.frames.astype(int) * 40, 65535)
+    strange = replace(ordinary, frames=counts)
     for touch, rate, stop in (
         (ordinary, error, (0.3, "confidence", False)),
         (strange, error, (1.2, "confidence", True)),
@@ -169,29 +139,25 @@ def test_a_touch_unlike_all_others_waits_and_is_flagged_as_unusual(
             assert (event.window_s, event.stopped_by, flagged) == stop
 
 
-@pytest.mark.parametrize("early_ones", [True, False])
+@pytest.mark.parametrize("window_s", [0.3, 1.2])
 def test_an_unknown_thing_has_no_name_but_a_kind_at_once(
-    hasty, make_touch, monkeypatch, early_ones
+    hasty, make_touch, change, window_s
 ):
     model, error = hasty
-    stopping = model.info.stopping["object"]
-    nowhere = replace(stopping.remoteness, limits=(0.0, 0.0, 0.0))
-    unmet = replace(stopping, remoteness=nowhere)
-    monkeypatch.setitem(model.info.stopping, "object", unmet)
+    remoteness = model.info.stopping["object"].remoteness
+    change("object", remoteness=replace(remoteness, limits=(0.0, 0.0, 0.0)))
     touch = make_touch(kind="hard", seed=50)
-    events = decided(model, touch, error if early_ones else None)
-    assert events["object"].label is None
-    assert events["object"].confidence == 0.0
-    assert events["object"].flags == ("unknown",)
-    assert events["object"].window_s == (0.3 if early_ones else 1.2)
-    assert events["category"].label == "rigid-fixed"
-    assert "unknown" not in events["category"].flags
+    events = decided(model, touch, error if window_s < 1.2 else None)
+    name = events["object"]
+    kind = events["category"]
+    assert (name.label, name.confidence, name.flags) == (None, 0.0, ("unknown",))
+    assert name.window_s == window_s
+    assert kind.label == "rigid-fixed"
+    assert "unknown" not in kind.flags
 
 
 def test_an_error_that_no_task_certifies_is_refused_with_what_would_do(early):
-    with pytest.raises(
-        InputError, match="cannot be certified; category: the smallest error that"
-    ):
+    with pytest.raises(InputError, match="cannot be certified; category: the smallest"):
         Classifier(early, error=0.001)
 
 

@@ -11,7 +11,7 @@ from train.data.dataset import load_trials
 
 @pytest.fixture(scope="module")
 def data(recordings):
-    return load_trials(sorted(recordings.iterdir()))
+    return load_trials(sorted(recordings.glob("*.npz")))
 
 
 @pytest.mark.parametrize("count", [1, 4, 16, 100])

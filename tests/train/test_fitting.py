@@ -1,7 +1,6 @@
 """From recordings to a fitted model, from Python."""
 
 import numpy as np
-import pytest
 
 import train
 from edge.record.saving import save
@@ -69,12 +68,6 @@ def test_touches_that_were_missed_are_wrong_and_none_found_in_none_is_right(
     after, before = (fitted.chosen["category"].accuracy for fitted in fits)
     assert after.right == before.right + 1
     assert after.total == before.total + 2
-
-
-def test_names_of_train_are_loaded_when_they_are_asked_for():
-    assert train.fit.__module__ == "train.fitting"
-    with pytest.raises(AttributeError, match="no attribute 'nothing'"):
-        _ = train.nothing
 
 
 def test_settings_are_chosen_by_a_part_of_many_trials_and_fitted_on_all(

@@ -28,7 +28,7 @@ def test_stages_share_a_bar_and_are_lines_of_the_log(capsys, monkeypatch, caplog
     monkeypatch.setattr(progress, "LOG_S", 0.0)
     monkeypatch.setattr(progress, "FIRST_S", 0.0)
     with (
-        caplog.at_level(logging.DEBUG),
+        caplog.at_level(logging.DEBUG, "train"),
         progress.stages({"first": 3.0, "second": 1.0}, shown=True) as stage,
     ):
         for name in ("first", "second"):

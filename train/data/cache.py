@@ -64,7 +64,7 @@ def prepared(folders: Iterable[Path]) -> dict[Path, Path]:
     return places
 
 
-def kept(
+def contacts_of(
     place: Path | None,
     recording: Recording,
     layout: SkinLayout,

@@ -14,7 +14,7 @@ from edge.touch.contact import Contact, FeatureSeries
 from edge.touch.frame import Frame
 from edge.touch.layout import SkinLayout, for_device
 from edge.touch.track import ContactTracker
-from train.data.cache import Contacts, kept
+from train.data.cache import Contacts, contacts_of
 from train.data.labels import completed, contradictory, labels_of
 
 Named = tuple[Recording, Path]
@@ -162,7 +162,7 @@ def follow(
 
         chain = tracked.get("chain")
         how = features, joints, chain and chain.to_dict(), tracked.get("horizon_s")
-        touches = kept(place, recording, layout, how, touched)
+        touches = contacts_of(place, recording, layout, how, touched)
         return touches, labels_of(recording, len(touches))
     except InputError as error:
         raise InputError(f"{path}: {error}") from None

@@ -184,8 +184,8 @@ class DataSet:
             name: (id(self.trials), window_s, samples, name, self.kernels.get(name))
             for name in names
         }
-        kept = self.scratch.kept
-        missing = [name for name in names if keys[name] not in kept]
+        tables = self.scratch.tables
+        missing = [name for name in names if keys[name] not in tables]
         if missing:
             sizes = widths(missing, samples, self.layout, self.joints)
             table = self.scratch.empty((len(self.trials), sum(sizes)))
@@ -196,8 +196,8 @@ class DataSet:
             columns = np.split(table, np.cumsum(sizes)[:-1], axis=1)
             # The trials stay with what is known of them, so that no others get their id.
             for name, of_name in zip(missing, columns, strict=True):
-                kept[keys[name]] = self.trials, of_name
-        return np.concatenate([kept[keys[name]][1] for name in names], axis=1)
+                tables[keys[name]] = self.trials, of_name
+        return np.concatenate([tables[keys[name]][1] for name in names], axis=1)
 
     def at_points(self, points_s: Sequence[float], samples: int) -> Floats:
         """(points, n, p) feature vectors at several windows."""
@@ -220,8 +220,8 @@ class DataSet:
         of the window, tables of that window's own change the accuracy by less than its
         interval.
         """
-        every = -(-len(self.trials) // MOST_TOUCHES)
-        felt = [trial.series.felt(window_s) for trial in self.trials[::every]]
+        step = -(-len(self.trials) // MOST_TOUCHES)
+        felt = [trial.series.felt(window_s) for trial in self.trials[::step]]
         tables = {
             name: kernel_table(
                 [kernel_channels(series, window_s, name) for series in felt],

@@ -26,11 +26,11 @@ class Scratch:
     Other processes of joblib map the same files, rather than take copies.
 
     Attributes:
-        kept: {key: what need not be computed again}.
+        tables: {key: what need not be computed again}.
     """
 
     def __init__(self) -> None:
-        self.kept: dict[Any, Any] = {}
+        self.tables: dict[Any, Any] = {}
         self._folder: tempfile.TemporaryDirectory[str] | None = None
         self._chunks: list[NDArray[np.uint8]] = []
         self._used = CHUNK_BYTES

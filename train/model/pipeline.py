@@ -463,8 +463,8 @@ def slopes_of(settings: Iterable[Choices], vectors: Vectors) -> Slopes:
     """The slopes of several settings of the tasks, by trials (n, p)."""
     slopes: dict[tuple[str, Choice], float] = {}
     for choices in settings:
-        asked = {task: replace(choice, k=1) for task, choice in choices.items()}
-        new = {task: c for task, c in asked.items() if (task, c) not in slopes}
+        single = {task: replace(choice, k=1) for task, choice in choices.items()}
+        new = {task: c for task, c in single.items() if (task, c) not in slopes}
         for together in sharing_a_space(new, vectors):
             features = next(iter(together.values())).features
             measured = _slopes(together, vectors.of(features))

@@ -62,9 +62,9 @@ def divided(
     first = 0
     for labels in np.unique(sets):
         members = np.flatnonzero(sets == labels)
-        parts = _parts(coordinates[members], count)
-        prototypes[members] = first + parts
-        first += int(parts.max()) + 1
+        places = _parts(coordinates[members], count)
+        prototypes[members] = first + places
+        first += int(places.max()) + 1
     return prototypes
 
 
@@ -72,7 +72,7 @@ def _parts(rows: Floats, count: int) -> Integers:
     """(n,) the part of each of some rows, numbered without a gap."""
     different = len(np.unique(rows, axis=0))
     with threadpool_limits(1):  # sums of several threads have other bits
-        parts = KMeans(min(count, different), n_init=1, random_state=SEED).fit_predict(
+        places = KMeans(min(count, different), n_init=1, random_state=SEED).fit_predict(
             rows
         )
-    return np.asarray(np.unique(parts, return_inverse=True)[1], dtype=np.int64)
+    return np.asarray(np.unique(places, return_inverse=True)[1], dtype=np.int64)

@@ -1,7 +1,7 @@
 """The reports' pictures as PNG, and what they share."""
 
 import io
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import matplotlib as mpl
@@ -9,20 +9,9 @@ import numpy as np
 from matplotlib.figure import Figure as Canvas
 from sklearn.metrics import ConfusionMatrixDisplay
 
-from edge.arrays import Floats
-from train.choose.evaluate import Result
 from train.data.vectors import Strings
 from train.report.section import Figure
 
-STROKES: tuple[tuple[str, str, Any], ...] = (
-    ("#1f5fa8", "o", "-"),
-    ("#d9822b", "s", "--"),
-    ("#2f7d5b", "^", "-."),
-    ("#7a5195", "D", ":"),
-    ("#8a6d1d", "v", (0, (6, 1, 1, 1, 1, 1))),
-    ("#444444", "P", (0, (3, 1, 1, 3))),
-)
-"""Colour, marker and dashes of each series, so that no two differ by hue alone."""
 STYLE: dict[Any, Any] = {
     "font.size": 9.0,
     "axes.spines.top": False,
@@ -33,9 +22,6 @@ STYLE: dict[Any, Any] = {
     "axes.formatter.useoffset": False,
     "text.parse_math": False,  # a label with two dollar signs is no formula
 }
-WIDE = 7.6
-PANEL = 3.6
-"""Inches."""
 MATRIX_TEXT = 20
 """A confusion matrix of more classes does not show its numbers."""
 
@@ -45,7 +31,7 @@ def picture(
     title: str,
     draw: Callable[[Any], None],
     height: float,
-    width: float = WIDE,
+    width: float,
     style: Mapping[Any, Any] | None = None,
 ) -> Figure:
     """The picture that a function draws; the same numbers give the same bytes.
@@ -64,44 +50,6 @@ def picture(
         buffer = io.BytesIO()
         canvas.savefig(buffer, format="png", dpi=110, metadata={"Software": None})
     return Figure(name, title, buffer.getvalue())
-
-
-def legend(canvas: Any, axes: Any, columns: int) -> None:
-    """Add a legend above the axes, where it hides nothing; none for a single series."""
-    handles, labels = axes.get_legend_handles_labels()
-    if len(handles) > 1:
-        canvas.legend(
-            handles,
-            labels,
-            loc="outside upper center",
-            ncols=columns,
-            frameon=False,
-        )
-
-
-def spread(
-    results: Sequence[Result],
-) -> tuple[Floats, Floats]:
-    """(n,) accuracies in percent, and (2, n) their distances to the ends of the
-    intervals."""
-    values = np.array([100 * result.accuracy for result in results])
-    low, high = 100 * np.array([result.interval for result in results]).T
-    return values, np.maximum([values - low, high - values], 0.0)
-
-
-def curve(
-    axes: Any,
-    order: int,
-    label: str,
-    x: Sequence[float],
-    results: Sequence[Result],
-) -> None:
-    """Draw accuracies in percent with their 95 % intervals, in the `order`-th of
-    `STROKES`."""
-    colour, marker, dashes = STROKES[order % len(STROKES)]
-    y, (below, above) = spread(results)
-    axes.fill_between(x, y - below, y + above, color=colour, alpha=0.12, lw=0)
-    axes.plot(x, y, color=colour, marker=marker, ls=dashes, ms=4, label=label)
 
 
 def confusion(name: str, title: str, truth: Strings, answers: Strings) -> Figure:

@@ -154,8 +154,7 @@ class PhysicsRun:
         traces: {name: (n, frames)} that effects keep, such as `slide_m`.
         window: (n, frames, rows, C) counts on the columns that can touch; no frames
             where the run made no images.
-        images: {effect: (n, frames, rows, C, images)} likewise, of effects that have
-            `IMAGES`.
+        shear: (n, frames, rows, C, 2) likewise of the tangential load, if there is any.
         trials: their state after the last step.
     """
 
@@ -164,7 +163,7 @@ class PhysicsRun:
     force: Array
     traces: dict[str, Array]
     window: NDArray[np.float32]
-    images: dict[str, NDArray[np.float32]]
+    shear: NDArray[np.float32] | None
     trials: Batch
 
     @classmethod
@@ -173,16 +172,14 @@ class PhysicsRun:
         n = batch.n
         frames = batch.scene.frame_count
         shape = n, frames if images else 0, *batch.touch.image.shape[:2]
+        shears = bool(batch.plan.stages[TRACTION])
         run = cls(
             t=np.arange(frames) / batch.scene.rate_hz,
             joints=np.empty((n, frames, len(batch.arm.q))),
             force=np.zeros((n, frames)),
             traces={},
             window=np.zeros(shape, dtype=np.float32),
-            images={
-                call.owner: np.zeros((*shape, 2), dtype=np.float32)
-                for call in batch.plan.stages[TRACTION]
-            },
+            shear=np.zeros((*shape, 2), dtype=np.float32) if shears else None,
             trials=batch,
         )
         run.joints[:, 0] = batch.arm.q.T
@@ -209,8 +206,9 @@ class PhysicsRun:
         self.window[t.places, t.clock.frame] = np.moveaxis(counts, -1, 0)
         for call, rubbed in t.calls(TRACTION):
             loads = call.function(rubbed) * scale
+            assert self.shear is not None
             image = np.moveaxis(loads, (0, -1), (-1, 0))
-            self.images[call.owner][rubbed.places, rubbed.clock.frame] = image
+            self.shear[rubbed.places, rubbed.clock.frame] = image
 
 
 def run_physics(
@@ -331,22 +329,23 @@ def readings(
     scene = batch.scene
     plan = batch.plan
     places = np.arange(batch.n) if which is None else which
+
+    def on_skin(window: NDArray[np.float32], i: int) -> NDArray[np.float32]:
+        shape = len(physics.t), *scene.skin.shape, *window.shape[4:]
+        image = np.zeros(shape, dtype=np.float32)
+        image[:, :, batch.bed.columns[:, i]] = window[i]
+        return image
+
     for i in places.tolist():
-        counts = np.zeros((len(physics.t), *scene.skin.shape), dtype=np.float32)
-        counts[:, :, batch.bed.columns[:, i]] = physics.window[i]
-        images = {}
-        for effect, window in physics.images.items():
-            images[effect] = np.zeros((*counts.shape, window.shape[-1]), np.float32)
-            images[effect][:, :, batch.bed.columns[:, i]] = window[i]
         reading = Readings(
             scene=scene,
             trial=batch.specs[i],
             effects=plan.effects[i],
             which=i,
             t=physics.t,
-            counts=counts,
+            counts=on_skin(physics.window, i),
             joints=physics.joints[i].copy(),
-            images=images,
+            tangential=None if physics.shear is None else on_skin(physics.shear, i),
         )
         for stage in SENSOR:
             for call in plan.stages[stage]:

@@ -1,6 +1,6 @@
 """A trial's sensor readings on the way from the load to whole counts."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,8 +30,8 @@ class Readings:
         times: (frames,) seconds, if a clock effect shifts them.
         arrives: (frames,) whether each frame arrives, if some are lost.
         valid: (rows, cols) whether each taxel works, if dead ones are known.
-        images: {effect: (frames, rows, cols, images) further counts of each taxel} of
-            the effects that have `IMAGES`.
+        tangential: (frames, rows, cols, 2) counts of both tangential axes, if there are
+            any.
     """
 
     scene: Scene
@@ -44,7 +44,7 @@ class Readings:
     times: Array | None = None
     arrives: Mask | None = None
     valid: Mask | None = None
-    images: dict[str, NDArray[np.float32]] = field(default_factory=dict)
+    tangential: NDArray[np.float32] | None = None
 
     def stream(self, effect: str) -> np.random.Generator:
         """An effect's random numbers in this trial."""
@@ -62,7 +62,7 @@ class Readings:
     def shear(self) -> NDArray[np.int16] | None:
         """(frames, rows, cols, 2) whole counts of both tangential axes, if there are
         any; 0 of taxels that are known to be dead."""
-        if "shear" not in self.images:
+        if self.tangential is None:
             return None
-        counts = np.clip(np.rint(self.images["shear"]), -HALF, HALF).astype(np.int16)
+        counts = np.clip(np.rint(self.tangential), -HALF, HALF).astype(np.int16)
         return counts if self.valid is None else counts * self.valid[:, :, None]

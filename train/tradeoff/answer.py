@@ -1,8 +1,13 @@
 """The sections on accuracy against time, with the command that exports each model."""
 
+from collections.abc import Sequence
 from typing import Any
 
-from train.report.figures import PANEL, STROKES, curve, legend, picture, spread
+import numpy as np
+
+from edge.arrays import Floats
+from train.choose.evaluate import Result
+from train.report.figures import picture
 from train.report.score import majority, percent, shares
 from train.report.section import Figure, Row, Section, Table
 from train.tradeoff.choices import WINDOWS_S, unseen
@@ -10,10 +15,10 @@ from train.tradeoff.measured import Measurements
 
 TITLE_S = (0.6, 1.2)
 """Windows with their accuracy in a panel's title."""
+PANEL = 3.6
+"""Inches of a panel."""
 ACROSS = 3
 """At most so many panels stand side by side."""
-
-
 EARLY = (
     "--leave-out trial",
     f"--decision-points {WINDOWS_S[0]}:{WINDOWS_S[-1]}:0.1",
@@ -146,10 +151,10 @@ def picture_of(measurements: Measurements) -> Figure:
             axes.set_visible(False)
         for axes in grid[:, 0]:
             axes.set_ylabel("decisions that are right, %")
-        fullest = max(
-            grid.flat, key=lambda axes: len(axes.get_legend_handles_labels()[0])
-        )
-        legend(canvas, fullest, 3)
+        # Above the panels the legend hides nothing.
+        series = [axes.get_legend_handles_labels() for axes in grid.flat]
+        fullest = max(series, key=lambda handles: len(handles[0]))
+        canvas.legend(*fullest, loc="outside upper center", ncols=3, frameon=False)
 
     title = "Accuracy against the time of the decision, for each task"
     width = max(PANEL * across, PANEL + 2.0)
@@ -157,37 +162,36 @@ def picture_of(measurements: Measurements) -> Figure:
 
 
 def _panel(axes: Any, task: str, measurements: Measurements) -> None:
-    """Draw a task's accuracy after fixed windows and with early decisions."""
+    """Draw a task's accuracy after fixed windows and with early decisions, which differ
+    not by hue alone."""
     results = measurements.results(task)
+    windows = list(results)
     chance = 100 * majority(measurements.y[task]).accuracy
     axes.axhline(
-        chance,
-        color="0.45",
-        lw=1,
-        ls=(0, (1, 2)),
-        label="most frequent label",
+        chance, color="0.45", lw=1, ls=(0, (1, 2)), label="most frequent label"
     )
-    curve(axes, 0, "after a fixed time", list(results), list(results.values()))
-    colour, marker, dashes = STROKES[1]
+    share, (below, above) = _spread(list(results.values()))
+    axes.fill_between(windows, share - below, share + above, alpha=0.12, lw=0)
+    axes.plot(windows, share, "o-", ms=4, label="after a fixed time")
     rules = measurements.certified[task]
     if rules:
-        share, arms = spread([rule.result for rule in rules])
-        axes.errorbar(
-            [rule.mean_s for rule in rules],
-            share,
-            arms,
-            color=colour,
-            marker=marker,
-            ls=dashes,
-            ms=4,
-            elinewidth=0.8,
-            label="early decision, mean time",
-        )
-    named = [
+        times = [rule.mean_s for rule in rules]
+        share, arms = _spread([rule.result for rule in rules])
+        label = "early decision, mean time"
+        axes.errorbar(times, share, arms, fmt="s--", ms=4, elinewidth=0.8, label=label)
+    titles = [
         f"{100 * results[w].accuracy:.0f} % after {w:g} s"
         for w in TITLE_S
         if w in results
     ]
     axes.set(xlim=(0, max(results) + 0.08), ylim=(0, 103))
     axes.set(yticks=range(0, 101, 20), xlabel="seconds from first contact")
-    axes.set_title(f"{task}: {', '.join(named)}", fontsize="medium")
+    axes.set_title(f"{task}: {', '.join(titles)}", fontsize="medium")
+
+
+def _spread(results: Sequence[Result]) -> tuple[Floats, Floats]:
+    """(n,) accuracies in percent, and (2, n) their distances to the ends of the
+    intervals."""
+    values = np.array([100 * result.accuracy for result in results])
+    low, high = 100 * np.array([result.interval for result in results]).T
+    return values, np.maximum([values - low, high - values], 0.0)

@@ -21,7 +21,7 @@ from edge.errors import InputError, counted, places_text
 from edge.touch.region import find_regions
 from edge.wire.skin.calibration import (
     FEWEST_FRAMES,
-    Measurement,
+    RestValues,
     deaf_taxels,
     measure,
     noisiest_taxels,
@@ -53,12 +53,12 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--yes",
         action="store_true",
-        help="at the first calibration: nothing touches the skin",
+        help="assurance that nothing touches the skin, for its first calibration",
     )
     parser.add_argument(
         "--force",
         action="store_true",
-        help="write the calibration even if something seems to touch the skin; taxels "
+        help="calibration even if something seems to touch the skin; taxels "
         "without a usable value keep their former one",
     )
 
@@ -99,7 +99,7 @@ def _apart(former: TaxelCalibration | None) -> str:
     return "beyond the others" if former is None else "off the former calibration"
 
 
-def _rest(file: SkinFile, measured: Measurement) -> str:
+def _rest(file: SkinFile, measured: RestValues) -> str:
     """Where the working taxels rest: half of them within this distance of the median."""
     rest = measured.calibration.baseline.ravel()[list(file.served)].astype(np.int64)
     middle = int(np.median(rest))
@@ -107,7 +107,7 @@ def _rest(file: SkinFile, measured: Measurement) -> str:
     return f"{counted(len(rest), 'taxel')} rest at {middle} +- {spread}"
 
 
-def first_rest(file: SkinFile, measured: Measurement) -> str:
+def first_rest(file: SkinFile, measured: RestValues) -> str:
     """Where the chips rest, and where they usually do, for a person to judge."""
     rest = measured.calibration.baseline.ravel()
     middles = [int(np.median(rest[chip.served])) for chip in file.chips]
@@ -154,7 +154,7 @@ def problems(
 
 def replace_unusable(
     file: SkinFile,
-    measured: Measurement,
+    measured: RestValues,
     former: TaxelCalibration | None,
     force: bool,
 ) -> int:

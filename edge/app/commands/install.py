@@ -44,7 +44,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--back",
         action="store_true",
-        help="exchange the model for the former one",
+        help="exchange of the model for the former one",
     )
 
 

@@ -23,7 +23,7 @@ from edge.errors import InputError, counted
 from edge.record.changes import FORMER, Change, change, former, now, undo
 from edge.record.labels import Standing, Table, read_table
 from edge.record.recording import read_meta
-from edge.record.saving import listed, warn_of_remains
+from edge.record.saving import listed, warn_of_gone
 from edge.record.slips import counts_text, slips
 
 CHANGES = ("set", "unset", "accept", "leave_out", "put_back", "rows")
@@ -43,19 +43,19 @@ def add_options(parser: argparse.ArgumentParser) -> None:
             "--set",
             "TASK=LABEL",
             task_label,
-            "give every recording named this label; repeat it for more tasks",
+            "label for every recording named; repeat it for more tasks",
         ),
         (
             "--unset",
             "TASK",
             str,
-            "take this task's label away; repeat it for more",
+            "task whose label is taken away; repeat it for more",
         ),
         (
             "--only",
             "WHICH",
             str,
-            "only recordings that are unsure, wrong, unlabelled or left_out, that have a "
+            "recordings that are unsure, wrong, unlabelled or left_out, that have a "
             "task, or a label (object=cupp); repeat it for those that are all of these",
         ),
     ):
@@ -68,12 +68,12 @@ def add_options(parser: argparse.ArgumentParser) -> None:
             help=text,
         )
     for option, text in {
-        "--accept": "label kept touches as they were decided, in tasks without a label",
-        "--leave-out": "leave the recordings out of whatever reads the folder",
-        "--put-back": "take recordings in again that were left out",
-        "--rows": "give each recording its row, to go on in a spreadsheet",
-        "--undo": "take the last change in a folder back",
-        "--yes": "change the labels, which else are only shown",
+        "--accept": "labels of kept touches as they were decided, in tasks without one",
+        "--leave-out": "recordings named are left out by whatever reads the folder",
+        "--put-back": "recordings that were left out are taken in again",
+        "--rows": "a row for each recording, to go on in a spreadsheet",
+        "--undo": "the last change in a folder is taken back",
+        "--yes": "change of the labels, which else are only shown",
     }.items():
         parser.add_argument(option, action="store_true", help=text)
 
@@ -88,7 +88,7 @@ def run(arguments: argparse.Namespace) -> int:
         raise InputError("--set and --unset name a task twice; name it once")
     table_of = cache(read_table)
     paths = listed(arguments.data)
-    warn_of_remains(paths, table_of)
+    warn_of_gone(paths, table_of)
     touches = read(paths, table_of)
     selected = review.selected(touches, arguments.only)
     if not selected:

@@ -31,7 +31,7 @@ from edge.app.review import decisions_of
 from edge.app.sinks.event_writer import Lines
 from edge.app.sinks.sink import Event
 from edge.app.source import Opened, reading
-from edge.app.trials import Trials, recording, shared_meta
+from edge.app.trials import Segmenter, recording, shared_meta
 from edge.decide.classifier import Classifier
 from edge.decide.events import Decided
 from edge.decide.model import Model
@@ -65,7 +65,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         default=[],
         type=task_label,
         metavar="TASK=LABEL",
-        help="what the skin touches, such as object=box; repeat it for several tasks, "
+        help="label of the touches, such as object=box; repeat it for several tasks, "
         "and with --web for several labels of a task, which the page then offers",
     )
     parser.add_argument(
@@ -80,7 +80,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--trials",
         type=within(int, 1, 1e9),
-        help="stop after this many trials",
+        help="number of trials after which to stop",
     )
     parser.add_argument(
         "--length",
@@ -144,7 +144,7 @@ def run(arguments: argparse.Namespace) -> int:
             live.page,
         )
         LOG.info("waiting for a contact")
-        trials = Trials(live.skin, arguments.length)
+        trials = Segmenter(live.skin, arguments.length)
         classifier = None if model is None else Classifier(model, live.skin.layout)
         for frame, faults in live.frames():
             events = faults + ([] if classifier is None else classifier.push(frame))
@@ -288,7 +288,7 @@ class Recorder:
         paths = [path for path in self.paths if path.exists()]
         return len(paths) - (0 if self.page is None else self.page.left_out(paths))
 
-    def follow(self, trials: Trials, events: Sequence[Event] = ()) -> None:
+    def follow(self, trials: Segmenter, events: Sequence[Event] = ()) -> None:
         """Take over the page's labels, and the decisions about the touch under way,
         which keeps the labels of its beginning."""
         self.decided += [event for event in events if isinstance(event, Decided)]

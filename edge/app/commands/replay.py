@@ -34,7 +34,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--summary",
         action="store_true",
-        help="print each task's accuracy and confusion matrix, for labelled recordings",
+        help="each task's accuracy and confusion matrix, for labelled recordings",
     )
     add_engine(parser)
     add_error(parser)

@@ -6,6 +6,7 @@ tells systemd when it is ready and that it is alive.
 """
 
 import argparse
+from collections.abc import Sequence
 from contextlib import ExitStack, closing
 from typing import Any
 
@@ -19,8 +20,9 @@ from edge.app.options import (
 )
 from edge.app.output import LOG
 from edge.app.sinks import keeper, systemd
+from edge.app.sinks.event_writer import Lines
 from edge.app.sinks.sink import Sink
-from edge.app.source import reading
+from edge.app.source import Live, reading
 from edge.decide.classifier import Classifier
 from edge.decide.model import Model
 from edge.touch.layout import differences
@@ -42,16 +44,16 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         "--without-joints",
         choices=("flag", "skin"),
         default="flag",
-        help="if joint angles are missing at a contact's onset: `flag` (the default) decides "
-        "without them, flagged missing_pose; `skin` measures the contact's motion on "
-        "the skin, flagged skin_motion",
+        help="answer to joint angles that are missing at a contact's onset: `flag` (the "
+        "default) decides without them, flagged missing_pose; `skin` measures the "
+        "contact's motion on the skin, flagged skin_motion",
     )
     parser.add_argument(
         "--contacts",
         type=within(int, 1, MAX_CONTACTS),
         default=1,
         metavar="N",
-        help="follow up to this many contacts at once; with more than 1, events have the "
+        help="number of contacts that are followed at once; with more than 1, events have the "
         "contact's number, and decisions its position (default: %(default)s)",
     )
     for sink in SINKS:
@@ -105,14 +107,22 @@ def run(arguments: argparse.Namespace) -> int:
                 sink = module.open_sink(arguments, live.opened, model)
                 if sink is not None:
                     sinks.append(stack.enter_context(closing(sink)))
-            frames = 0
-            for frame, faults in live.frames():
-                frames += 1
-                events = [*faults, *classifier.push(frame)]
-                for sink in sinks:
-                    sink.push(frame, events)
-                if lines.gone:
-                    break
+            frames = _read(live, classifier, sinks, lines)
             lines.write(event.to_dict() for event in classifier.finish())
             lines.write([end_event(live.loop.schedule, frames, lines.lost)])
     return 0
+
+
+def _read(
+    live: Live, classifier: Classifier, sinks: Sequence[Sink], lines: Lines
+) -> int:
+    """Push every frame into the sinks, until nobody reads the lines; how many."""
+    frames = 0
+    for frame, faults in live.frames():
+        frames += 1
+        events = [*faults, *classifier.push(frame)]
+        for sink in sinks:
+            sink.push(frame, events)
+        if lines.gone:
+            break
+    return frames

@@ -14,7 +14,7 @@ from edge.app.output import LOG
 from edge.app.review import decisions_of, is_unsure
 from edge.app.sinks.sink import Event
 from edge.app.source import Opened
-from edge.app.trials import Trials, recording, shared_meta
+from edge.app.trials import Segmenter, recording, shared_meta
 from edge.decide.events import Decided
 from edge.decide.info import ModelInfo
 from edge.decide.model import Model
@@ -104,7 +104,7 @@ class Keeper:
         self._meta = shared_meta(opened, info.chain)
         if info.chain is not None:
             self._meta["joint_names"] = list(info.chain.names)
-        self._trials = Trials(opened.skin, LONGEST_S)
+        self._trials = Segmenter(opened.skin, LONGEST_S)
         self._complete: deque[list[Frame]] = deque()
         """The frames of touches that wait for their decisions."""
         self._decided: list[Decided] = []

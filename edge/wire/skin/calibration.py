@@ -115,7 +115,7 @@ median noise plus so many counts."""
 
 
 @dataclass(frozen=True)
-class Measurement:
+class RestValues:
     """The rest values and noise of a skin.
 
     Attributes:
@@ -129,7 +129,7 @@ class Measurement:
     frames: int
 
 
-def measure(skin: Skin, frames: int, lasts_s: float = math.inf) -> Measurement:
+def measure(skin: Skin, frames: int, lasts_s: float = math.inf) -> RestValues:
     """Measure rest values and noise, from sums of whole numbers.
 
     Args:
@@ -152,7 +152,7 @@ def measure(skin: Skin, frames: int, lasts_s: float = math.inf) -> Measurement:
     if skin.layout.axes:
         mean, deviation = tangential.mean_and_deviation()
         calibration = replace(calibration, shear_baseline=mean, shear_noise=deviation)
-    return Measurement(calibration, normal.n, count)
+    return RestValues(calibration, normal.n, count)
 
 
 class Sums:

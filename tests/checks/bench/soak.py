@@ -39,6 +39,7 @@ from edge.touch.frame import Frame
 from edge.touch.track import MAX_CONTACTS
 from edge.wire.skin import file as skinfile
 from edge.wire.skin.loop import Loop
+from tests.checks.__main__ import end_with_parent
 from tests.checks.bench import tables
 from tests.checks.bench.program import start
 from tests.conftest import started
@@ -121,6 +122,7 @@ def ask(link):
 
 def clients(link):
     """The clients, in a process of their own."""
+    end_with_parent()
     os.nice(19)
     with ThreadPoolExecutor(CLIENTS) as threads:
         list(threads.map(ask, [link] * CLIENTS))

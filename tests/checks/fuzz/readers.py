@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 
 from edge.app.cli import main as edge_main
+from edge.decide.engines import ENGINES
 from edge.decide.model import Model
 from edge.errors import InputError
 from edge.touch.arm import Chain
@@ -119,12 +120,13 @@ def recordings():
 
 
 def read_model(path):
-    """Load a model and ask it once."""
-    model = Model(path)
-    for task, decision in model.decide(np.ones(model.info.width)).items():
-        confidence = decision.confidence
-        if confidence is not None and not 0.0 <= confidence <= 1.0:
-            raise Wrong(f"{task} has a confidence of {confidence}")
+    """Load a model and ask it once, by numpy too where ONNX Runtime takes it."""
+    for engine in ENGINES:
+        model = Model(path, engine)
+        for task, decision in model.decide(np.ones(model.info.width)).items():
+            confidence = decision.confidence
+            if confidence is not None and not 0.0 <= confidence <= 1.0:
+                raise Wrong(f"{task} has a confidence of {confidence}")
 
 
 def skins():

@@ -6,19 +6,18 @@ whether its answers are the same. Every golden file holds the same hard frames b
 its vectors.
 """
 
-import argparse
-import math
-import sys
 import tempfile
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
+from edge.decide.model import Model
 from edge.record.saving import save
+from export import golden
 from export.__main__ import main as export
-from export.api import save as save_model
-from tests.checks.hard_cases.models import features, labels_for
+from tests.checks.bench.program import start
+from tests.checks.hard_cases.models import Ours, features, labels_for
 from tests.checks.hard_cases.neighbours import (
     MANY,
     dominated,
@@ -26,64 +25,23 @@ from tests.checks.hard_cases.neighbours import (
     near_duplicates,
     offset_data,
 )
-from tests.conftest import FOREARM, touch
+from tests.conftest import touch
+from tests.export.microcontroller.recordings import damaged
 from train.data.dataset import load_trials
-from train.data.parts import part
-from train.fitted import Fitted
-from train.model.pipeline import Choice, ContactClassifier
-
-
-def seam(recording):
-    """The contact turned so that it lies across the seam."""
-    column = int(recording.frames[-1].sum(axis=0).argmax())
-    return replace(recording, frames=np.roll(recording.frames, -column, axis=2))
-
-
-def saturated(recording):
-    full = np.where(recording.frames > 0, 65535, 0).astype(np.uint16)
-    return replace(recording, frames=full)
-
-
-def jittered(recording):
-    """Uneven times, one instant twice, a gap."""
-    rng = np.random.default_rng(1)
-    t = np.cumsum(rng.uniform(0.002, 0.018, len(recording.t)))
-    t[60] = t[59]
-    t[80:] += 0.15
-    return replace(recording, t=t)
-
-
-def split(recording):
-    """The taxel with the most force cannot be read."""
-    valid = np.ones(FOREARM.shape, dtype=bool)
-    valid[np.unravel_index(recording.frames[-1].argmax(), FOREARM.shape)] = False
-    return replace(recording, valid=valid)
-
-
-def wrapped(recording):
-    """The first joint's angle jumps by a turn from frame to frame."""
-    joints = recording.joints.copy()
-    joints[::2, 0] += 2.0 * math.pi
-    return replace(recording, joints=joints)
-
-
-def short(recording):
-    """Let go after half the window, and touched from the first frame on."""
-    pressed = part(recording, slice(20, None))
-    frames = pressed.frames.copy()
-    frames[60:] = 0
-    return replace(pressed, frames=frames)
+from train.model.pipeline import Choice
 
 
 def hard_trials(folder):
-    """Contacts with everything that frames and times can do to them, stored in a
+    """Damaged touches all around the skin, a third of them saturated, stored in a
     folder."""
-    changes = (seam, saturated, jittered, split, wrapped, short)
-    for seed in range(2 * len(changes)):
-        change = changes[seed % len(changes)]
-        for kind in ("hard", "soft"):
-            trial = change(touch(kind=kind, seed=seed))
-            save(folder / f"{change.__name__}-{kind}-{seed}.npz", trial)
+    rng = np.random.default_rng(1)
+    for seed in range(24):
+        kind = ("hard", "soft")[seed % 2]
+        trial = damaged(touch(kind=kind, seed=seed), rng)
+        frames = np.roll(trial.frames, 2 * seed, axis=2)
+        if seed % 3 == 0:
+            frames = np.where(frames > 0, 65535, 0).astype(np.uint16)
+        save(folder / f"{kind}-{seed}.npz", replace(trial, frames=frames))
     return load_trials([folder])
 
 
@@ -112,32 +70,21 @@ def vectors(dataset):
     }
 
 
-def main(argv=None):
+def measure(out):
     """Write OUT/CASE/model.onnx and golden.npz."""
-    parser = argparse.ArgumentParser(prog="golden", description=__doc__)
-    parser.add_argument("--out", type=Path, default=Path("build/hard-cases/golden"))
-    arguments = parser.parse_args(argv)
     with tempfile.TemporaryDirectory() as trials:
         dataset = hard_trials(Path(trials))
         for name, (X, choice) in vectors(dataset).items():
-            labels = labels_for(X, 80 if name == MANY_LABELS else 5)
-            fitted = Fitted(
-                dataset=dataset,
-                measured=dataset,
-                window_s=1.2,
-                samples=X.shape[1] // 3,
-                X=X,
-                chosen={},
-                candidates=(),
-                classifier=ContactClassifier({"t": choice}).fit(X, {"t": labels}),
-            )
-            save_model(arguments.out / name / "model.onnx", fitted)
-            print(arguments.out / name)
+            ours = Ours(X, labels_for(X, 80 if name == MANY_LABELS else 5), choice)
+            path = Path(out) / name / "model.onnx"
+            path.parent.mkdir(parents=True, exist_ok=True)
+            path.write_bytes(ours.data)
+            golden.write(path.with_name("golden.npz"), Model(path), dataset, X)
+            print(name)
         # Decisions before the full window.
-        out = str(arguments.out / "decision_points")
-        points = ("--decision-points", "0.6:1.2:0.3", "--jobs", "1")
-        return export(["--data", trials, "--out", out, *points])
+        words = ("--decision-points", "0.6:1.2:0.3", "--jobs", "1")
+        return export(["--data", trials, "--out", f"{out}/decision_points", *words])
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    start(measure, __doc__, ("--out", "build/hard-cases/golden", "their folder"))

@@ -6,10 +6,8 @@ from hypothesis import strategies as st
 from tests.checks.hard_cases import exact
 from tests.checks.hard_cases.cases import SEEDS, Case, Ladder, decades, powers_of_ten
 from tests.checks.hard_cases.models import (
-    USUAL,
     Ours,
     features,
-    labels_for,
     usual_neighbours,
 )
 from train.model.pipeline import Choice
@@ -70,35 +68,10 @@ def dominated(power, seed):
     return X, queries
 
 
-def denormals(times, seed):
-    """One feature has a few of the smallest numbers of float64; the others are
-    ordinary."""
-    X = features(160, seed)
-    queries = features(24, seed + 1)
-    smallest = float(np.finfo(np.float64).smallest_subnormal)
-    X[:, :40] = (
-        np.random.default_rng(seed).integers(0, 50, (160, 40)) * times * smallest
-    )
-    queries[:, :40] = X[:24, :40]
-    return X, queries
-
-
-def wrong(data, choice):
-    """The error of a case: wrong answers to the queries of `data`."""
-
-    def error(**at):
-        X, queries = data(**at)
-        return Ours(X, choice=choice).wrong(queries)
-
-    return error
-
-
-def discriminants_error(shrinkage, seed):
-    """Wrong answers of a projection fitted to the labels, with ties of equal rows."""
-    X = features(60, seed)
-    X[30:40] = X[:10]
-    choice = Choice("III", 4, 4, projection="lda", shrinkage=shrinkage)
-    return Ours(X, labels_for(X, 5, seed), choice).wrong(X[::3])
+def duplicates_error(n, spread, seed):
+    """Wrong answers to rows that nearly repeat."""
+    X, queries = near_duplicates(n, spread, seed)
+    return Ours(X).wrong(queries)
 
 
 def far_error(factor, seed, n=160):
@@ -170,31 +143,21 @@ def grid_error(spread, seed):
     return float(errors.max() / np.linalg.norm(z, axis=1).max())
 
 
-def few_error(n, classes, same):
-    X = np.repeat(features(1), n, axis=0) if same else features(n)
-    ours = Ours(X, labels_for(X, classes), Choice("none", 6, n))
-    return ours.wrong(np.concatenate([X[:5], features(3, 1)]))
-
-
-def answers(name, error, hazard, around, ladder=None, usual=None):
-    """A row whose answers whole numbers judge."""
-    around = around | {"seed": SEEDS} if "seed" in hazard[0] else around
-    key = f"neighbours: {name}"
-    return Case(key, WHOLE, LISTS, error, hazard, around, ladder, usual, examples=4)
-
-
 CASES = [
-    answers(
-        "near-duplicate rows, spread 1e-7 to 1e-2 of the norm",
-        wrong(near_duplicates, USUAL),
+    Case(
+        "neighbours: near-duplicate rows, spread 1e-7 to 1e-2 of the norm",
+        WHOLE,
+        LISTS,
+        duplicates_error,
         [{"n": n, "spread": 1e-7, "seed": 0} for n in (160, MANY)],
-        {"n": st.just(160), "spread": powers_of_ten(-7, -2)},
+        {"n": st.just(160), "spread": powers_of_ten(-7, -2), "seed": SEEDS},
         Ladder(
             "spread over norm",
             decades(-2, -14, 0.5),
             "spread",
             "1e-6 (856 real grasps) and 3e-5 (cody18)",
         ),
+        examples=4,
     ),
     Case(
         "neighbours: distances of near-duplicates",
@@ -229,58 +192,6 @@ CASES = [
         Ladder("times as far out", decades(0, 12, 0.5), "factor", "1"),
         examples=4,
         bound=0.02,
-    ),
-    answers(
-        "offset 1e6, deviation 0.01",
-        wrong(offset_data, USUAL),
-        [{"offset": 1e6, "sd": 0.01, "seed": 0}],
-        {"offset": st.floats(-1e6, 1e6), "sd": st.sampled_from([0.01, 0.1, 1.0])},
-        Ladder(
-            "offset, of a deviation of 0.01",
-            decades(4, 15, 1),
-            "offset",
-            "0.036 and 0.014",
-        ),
-        lambda: usual_neighbours(*offset_data(1e6, 0.01, 0)),
-    ),
-    answers(
-        "equal distances",
-        wrong(lattice, Choice("none", 6, 8)),
-        [{"n": 160, "seed": 0}, {"n": MANY, "seed": 0}],
-        {"n": st.just(160)},
-        Ladder("training rows", [160, 1400], "n", "856 and 140"),
-    ),
-    answers(
-        "one row, one class, all rows the same, k as large as the training set",
-        few_error,
-        [
-            {"n": 1, "classes": 1, "same": False},
-            {"n": 30, "classes": 1, "same": False},
-            {"n": 12, "classes": 3, "same": True},
-            {"n": 480, "classes": 7, "same": False},
-        ],
-        {"n": st.integers(1, 90), "classes": st.integers(1, 4), "same": st.booleans()},
-    ),
-    answers(
-        "a feature much larger than those that separate the rows",
-        wrong(dominated, Choice("none", 6, 5)),
-        [{"power": power, "seed": 0} for power in (3.0, 12.0)],
-        {"power": st.floats(3.0, 16.0)},
-        Ladder("decades larger", [3, 6, 9, 12, 16, 20], "power"),
-    ),
-    answers(
-        "a feature of denormal numbers",
-        wrong(denormals, Choice("III", 6, 5)),
-        [{"times": 1, "seed": 0}],
-        {"times": st.integers(1, 2**30)},
-        Ladder("of the smallest numbers", [2**20, 2**10, 1], "times"),
-    ),
-    answers(
-        "discriminants",
-        discriminants_error,
-        [{"shrinkage": 0.1, "seed": 0}],
-        {"shrinkage": powers_of_ten(-4, 0)},
-        Ladder("shrinkage", decades(0, -12, 0.5), "shrinkage"),
     ),
     Case(
         "neighbours: queries outside the training set: cut off, and flagged",

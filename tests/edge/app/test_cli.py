@@ -17,9 +17,7 @@ from edge.demo import MODEL
 from edge.errors import InputError
 from edge.wire.bus.protocol import BusMissing
 from edge.wire.skin import file as skinfile
-from export.__main__ import main as export
 from tests.conftest import ROOT, python
-from train.__main__ import main as train
 
 
 def top(run):
@@ -124,14 +122,6 @@ def test_ctrl_c_is_exit_130_and_quiet_also_while_the_program_is_loaded(
     monkeypatch.setattr(cli, "import_module", raising(KeyboardInterrupt()))
     monkeypatch.setattr("sys.argv", ["edge-classify", "check", "skin.toml"])
     assert start() == 130
-    assert capsys.readouterr().err == ""
-
-
-@pytest.mark.parametrize("main", [train, export])
-def test_ctrl_c_while_a_program_of_the_workstation_is_loaded(main, capsys, monkeypatch):
-    for module in ("edge.app.cli", "edge.__main__"):
-        monkeypatch.setattr(f"{module}.import_module", raising(KeyboardInterrupt()))
-    assert main([]) == 130
     assert capsys.readouterr().err == ""
 
 

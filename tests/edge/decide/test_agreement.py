@@ -3,10 +3,15 @@
 import itertools
 
 import numpy as np
+import pytest
 
-from edge.decide.agreement import agreed, product_label
+from edge.decide.agreement import agreed, factors_fit, product_label
 
 FACTORS = {"mobility": (0, 1, 0, 1), "softness": (0, 0, 1, 1)}
+SWAPPED = {"mobility": (0, 1, 0, 1), "softness": (1, 1, 0, 0)}
+TWICE = {"mobility": (0, 1, 0, 0), "softness": (0, 0, 1, 1)}
+"""A pair stands for two labels, and another for none."""
+MADE = "rigid-fixed rigid-movable soft-fixed soft-movable"
 
 
 def test_the_answer_has_the_smallest_sum_of_all_that_agree():
@@ -35,3 +40,20 @@ def test_the_answer_has_the_smallest_sum_of_all_that_agree():
 def test_two_labels_decided_apart_name_the_label_of_their_product():
     assert product_label(FACTORS, {"mobility": 1, "softness": 0}) == 1
     assert product_label(FACTORS, {"softness": 1, "mobility": 0}) == 2
+
+
+@pytest.mark.parametrize(
+    ("names", "pairs", "fit"),
+    [
+        (MADE, FACTORS, True),
+        (MADE, SWAPPED, False),
+        ("wall box sofa pillow", FACTORS, True),
+        ("wall box sofa pillow", TWICE, False),
+    ],
+)
+def test_labels_that_are_made_of_their_factors_labels_stand_for_these(
+    names, pairs, fit
+):
+    labels = {"mobility": ("fixed", "movable"), "softness": ("rigid", "soft")}
+    labels["category"] = tuple(names.split())
+    assert factors_fit(pairs, labels, "category") is fit

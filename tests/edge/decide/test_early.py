@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from edge.decide.early import Product, Uncertified, is_sure, paired
+from edge.decide.early import JointDecision, Uncertified, is_sure, paired
 from edge.decide.events import Decided
 from edge.decide.info import Stopping, StoppingRule, Task
 from edge.decide.model import Decision
@@ -47,7 +47,7 @@ def factors(first, second, stops, confidences=(0.9, 0.8)):
 def answered(first, second, stops=("confidence",) * 2, rule=SURE):
     """The product's answer once its factors have these."""
     info = SimpleNamespace(tasks=TASKS, stopping={"category": None})
-    policy = Product(info, "category", rule, 0.1)
+    policy = JointDecision(info, "category", rule, 0.1)
     return policy.answer(CANDIDATE, 1, factors(first, second, stops))
 
 

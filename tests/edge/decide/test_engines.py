@@ -65,3 +65,13 @@ def test_run_takes_the_engine_that_is_asked_for(edge, monkeypatch, caplog):
     assert status == 0
     assert [e["label"] for e in events if e["event"] == "decision"][-1] == "pillow"
     assert "numpy runs the model" not in caplog.text
+
+
+def test_a_constant_that_numpy_misses_is_refused_when_the_model_is_loaded(tmp_path):
+    proto = onnx.load(demo.MODEL)
+    for tensor in proto.graph.initializer:
+        tensor.name = tensor.name.replace("scales of", "scale of")
+    path = tmp_path / "model.onnx"
+    path.write_bytes(sealed(proto))
+    with pytest.raises(InputError, match="KeyError: .*_label_distances"):
+        Model(path, "numpy")

@@ -10,13 +10,17 @@ from tests.edge.features.test_zones import FLAT, frame_of
 from tests.edge.touch.pressed import followed
 
 
-@pytest.mark.parametrize("shape", [(3, 5), (17, 31), (1, 700)])
-def test_a_cell_is_the_sum_of_its_readable_taxels_and_dead_cells_are_left_out(shape):
+@pytest.mark.parametrize(
+    ("shape", "side"), [((16, 16), 1), ((1, 257), 2), ((17, 31), 2), ((1, 700), 4)]
+)
+def test_a_cell_is_the_sum_of_its_readable_taxels_and_dead_cells_are_left_out(
+    shape, side
+):
     rows, cols = shape
     dead = np.random.default_rng(cols).permutation(rows * cols)[: rows * cols // 2]
     layout = SkinLayout(rows, cols, dead=tuple(sorted(dead.tolist())))
     frame = frame_of(cols, shape, 1.0)
-    side = Cells(layout).side
+    assert Cells(layout).side == side
     squares = [
         np.s_[row : row + side, col : col + side]
         for row in range(0, rows, side)

@@ -187,7 +187,5 @@ def test_a_damaged_table_is_refused(wrong):
 
 
 def test_values_beyond_14_bits_are_cut_off_after_the_shift():
-    channels = np.array([[16383, 16384, 1 << 60], [1, 1 << 13, 1 << 60]])
-    values = shifted(channels, (0, 1))
-    assert values.tolist() == [[16383] * 3, [2, 16383, 16383]]
-    assert shifted(channels, (-4, 14)).tolist() == [[1023, 1024, 16383], [16383] * 3]
+    channels = np.array([[16384, 1 << 60], [1 << 13, 1 << 60]])
+    assert shifted(channels, (-4, 14)).tolist() == [[1024, 16383], [16383] * 2]

@@ -59,7 +59,6 @@ def test_a_recording_that_is_wrong_is_not_written(make_touch, tmp_path):
 FLAT = np.ones((180, 384), np.uint16)
 WRONG = [
     ({"t": None}, "t is missing"),
-    ({"frames": None}, "frames is missing"),
     ({"frames": np.ones((180, 16, 24), complex)}, "frames must be uint16"),
     (
         {"frames": FLAT, "meta": '{"skin": {"rows": -16, "cols": -24}}'},
@@ -73,11 +72,9 @@ WRONG = [
         {"joints": lambda q: np.where(np.arange(180)[:, None] == 7, np.inf, q)},
         "joint angle of frame 7 is not finite",
     ),
-    ({"joints": lambda q: q[1:]}, "joints must be float64"),
     ({"valid": np.ones((2, 2), bool)}, "valid must be bool"),
     ({"meta": 3}, "meta must be one JSON text"),
     ({"meta": "{"}, "meta: not JSON"),
-    ({"meta": "[1]"}, "meta must be a JSON object"),
     ({"meta": '{"labels": {"a": true}}'}, "meta.labels and meta.contacts must map"),
     (
         {"meta": '{"joint_names": ["a"]}'},

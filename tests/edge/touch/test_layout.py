@@ -32,14 +32,6 @@ def test_a_flat_skin_lies_in_the_plane():
     assert SkinLayout(3, 5).position(2, 4) == (4.0, 2.0, 0.0)
 
 
-def test_units_say_what_is_known():
-    assert SkinLayout(1, 1).force_unit == "count"
-    assert SkinLayout(1, 1).length_unit == "taxel"
-    scaled = SkinLayout(1, 1, pitch_m=0.01, counts_per_newton=1000.0)
-    assert scaled.force_unit == "newton"
-    assert scaled.length_unit == "metre"
-
-
 def test_metadata_round_trip():
     layout = replace(CODY, dead=(3, 7), release_s=0.25, axes=3)
     assert SkinLayout.from_dict(layout.to_dict()) == layout
@@ -77,9 +69,10 @@ def test_the_models_thresholds_become_counts_of_the_device(scales, threshold, on
         SkinLayout(4, 6, counts_per_newton=scale, threshold_counts=n, dead=(n,))
         for scale, n in zip(scales, (10, 7), strict=True)
     )
-    model = replace(model, threshold_counts=100, onset_counts=150)
-    matched = {"threshold_counts": threshold, "onset_counts": onset, "dead": (10,)}
-    assert for_device(model, device) == replace(device, **matched)
+    model = replace(model, threshold_counts=100, onset_counts=150, release_s=1.0)
+    matched = replace(model, threshold_counts=threshold, onset_counts=onset)
+    matched = replace(matched, counts_per_newton=device.counts_per_newton)
+    assert for_device(model, device) == matched
 
 
 @pytest.mark.parametrize(

@@ -37,27 +37,34 @@ static frame next_frame(void) {
 /* Of a vector that is refused, what follows from its distances may be anything. */
 static void give_outputs(void) {
   bool refused = false;
-  for (uint32_t i = 0; i < EC_TASKS; i++) refused |= ec_arena[ec_tasks[i].places.label] < 0.0;
-  for (const ec_task *task = ec_tasks; task < ec_tasks + EC_TASKS; task++) {
-    give(ec_arena + task->places.label, 1);
-    give(ec_arena + task->places.scores, task->labels);
+  for (uint32_t i = 0; i < EC_TASKS; i++) refused |= ec_answers[i].label < 0;
+  for (uint32_t i = 0; i < EC_TASKS; i++) {
+    const ec_answer *a = &ec_answers[i];
+    const ec_task *task = &ec_tasks[i];
+    double label = a->label;
+    give(&label, 1);
+    for (uint32_t j = 0; j < task->labels; j++) {
+      double score = (double)a->votes[j] / task->k;
+      give(&score, 1);
+    }
     if (refused) continue;
-    give(ec_arena + task->places.distances, task->k);
-    give(ec_arena + task->places.neighbours, task->k);
-    if (task->places.label_distances) give(ec_arena + task->places.label_distances, task->labels);
+    give(a->distances, task->k);
+    for (uint32_t j = 0; j < task->k; j++) {
+      double neighbour = a->neighbours[j];
+      give(&neighbour, 1);
+    }
+    if (task->counts != EC_NOWHERE) give(a->label_distances, task->labels);
   }
   if (refused) return;
-  give(ec_arena + EC_PLACE_OUT_OF_RANGE, 1);
-  if (!EC_HAS_NOVELTY) return;
-  give(ec_arena + EC_PLACE_NOVELTY, 1);
-  give(ec_arena + EC_PLACE_REMOTENESS, 1);
+  double scores[3] = {ec_scores_now.out_of_range, ec_scores_now.novelty, ec_scores_now.remoteness};
+  give(scores, EC_HAS_NOVELTY ? 3 : 1);
 }
 
 static void give_vector(uint32_t point) {
   ec_close(point);
   ec_vector_begin();
   while (!ec_vector_slice(point)) continue;
-  give(ec_arena, EC_WIDTH);
+  give(ec_vector, EC_WIDTH);
 }
 
 /* Of the first contact, each when its window ends. */
@@ -161,12 +168,12 @@ int main(void) {
   uint32_t question[2];
   input = fopen("input.bin", "rb");
   output = fopen("output.bin", "wb");
-  if (!input || !output) return 1;
+  if (!input || !output || ec_model(ec_image) != EC_ACCEPTED) return 1;
   while (fread(question, 4, 2, input) == 2) {
     if (question[0] == VECTOR) {
-      take(ec_arena, 8 * EC_WIDTH);
-      ec_graph_begin();
-      while (!ec_graph_slice(question[1])) continue;
+      take(ec_vector, 8 * EC_WIDTH);
+      ec_formula_begin();
+      while (!ec_formula_slice(question[1])) continue;
       give_outputs();
     } else if (question[0] == VECTORS_OF_RECORDING) {
       give_vectors(question[1]);

@@ -80,7 +80,7 @@ def test_a_damaged_entry_is_followed_anew(folder, vectors):
 
 def test_a_folder_that_cannot_be_written_does_without(folder, vectors, caplog):
     (folder / cache.FOLDER).write_text("no folder")
-    with caplog.at_level(logging.DEBUG):
+    with caplog.at_level(logging.DEBUG, "train"):
         count, _ = vectors()
     assert count == 3
     assert str(folder) in caplog.text

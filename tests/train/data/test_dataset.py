@@ -309,9 +309,9 @@ def test_a_damaged_file_is_refused_or_named_and_left_out(folder):
 def test_features_are_measured_once_and_those_of_other_trials_anew(recordings):
     data = load_trials([recordings], Measurement(["max_force", "contact_area"]))
     X = data.features(0.5, 5)
-    kept = len(data.scratch.kept)
+    count = len(data.scratch.tables)
     assert data.of(["contact_area"]).features(0.5, 5).tolist() == X[:, 5:].tolist()
-    assert len(data.scratch.kept) == kept
+    assert len(data.scratch.tables) == count
     some = data.part(np.array([3, 1]))
     assert some.features(0.5, 5).tolist() == X[[3, 1]].tolist()
     assert data.at_points((0.5, 0.7), 5)[0].tolist() == X.tolist()

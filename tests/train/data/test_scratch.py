@@ -44,7 +44,7 @@ def test_what_is_put_is_the_same_once_memory_was_released(scratch):
         assert other.t.tobytes() == record.t.tobytes()
         assert other.zones["skin"].tolist() == zones["skin"].tolist()
         assert other.t.flags.writeable
-    assert pickle.loads(pickle.dumps(scratch)).kept == {}
+    assert pickle.loads(pickle.dumps(scratch)).tables == {}
 
 
 def test_other_processes_map_the_files(scratch):

@@ -118,7 +118,7 @@ def decisions(commands, error, fresh):
     for line in run:
         assert '"event": "decision"' in type_in(line)
     answers = {task: [] for task in model.info.tasks}
-    for path in sorted(fresh.iterdir()):
+    for path in sorted(fresh.glob("*.npz")):
         recording = load(path)
         tasks = set()
         for event in decide(model, recording, str(path), error):

@@ -72,7 +72,8 @@ def traction(t: Trials) -> Array:
 
 def sensor(readings: Readings) -> None:
     """Read both axes as the normal one: with its noise, and its dead band."""
-    counts = readings.images["shear"]
+    counts = readings.tangential
+    assert counts is not None
     scene = readings.scene
     if "noise" in readings.effects:
         deviation = scene.setting("noise", "counts")

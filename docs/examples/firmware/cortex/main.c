@@ -65,9 +65,8 @@ int main(void) {
   ec_frame frame;
   EVENTS->divider = CHIPS->divider = 16;
   EVENTS->control = CHIPS->control = 3;
-  while (!ec_selftest()) put('!');
+  while (ec_model(ec_image) != EC_ACCEPTED || !ec_selftest()) put('!');
   while (!ec_skin_begin()) ec_clock_us(500000);
-  ec_begin();
   for (;;) {
     bool comes = ec_skin_poll(ec_clock_us(0), &frame);
     if (comes) ec_push_lines(frame.counts, frame.valid, frame.t_s, NULL, ec_now_s, put);

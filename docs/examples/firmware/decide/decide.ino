@@ -43,16 +43,17 @@ void setup() {
   Wire.setClock(400000);
   EEPROM.begin(4096);
   while (!ec_skin_begin()) delay(500);
-#ifdef EC_TASKS
-  while (!ec_selftest()) Serial.println("{\"error\": \"compile with -ffp-contract=off\"}");
-  ec_begin();
+#ifdef EC_MOST_TASKS
+  while (ec_model(ec_image) != EC_ACCEPTED || !ec_selftest()) {
+    Serial.println("{\"error\": \"compile with -ffp-contract=off\"}");
+  }
 #endif
 }
 
 void loop() {
   ec_frame frame;
   const bool comes = ec_skin_poll(ec_clock_us(0), &frame);
-#ifdef EC_TASKS
+#ifdef EC_MOST_TASKS
   const ec_put put = [](char letter) { Serial.write(uint8_t(letter)); };
   if (Serial.available() && Serial.read() == 'c') Serial.println(int(ec_calibrate(1000, true)));
   if (comes && ec_is_calibrated()) {

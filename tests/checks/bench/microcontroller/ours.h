@@ -1,13 +1,15 @@
 #include "elementary.c"
-#include "graph.c"
+#include "formula.c"
+#include "image.c"
 #include "model.c"
 
-#define WIDTH EC_WIDTH
+#define WIDTH 120
 typedef double feature;
 
 static double decide(const feature *x) {
-  for (uint32_t i = 0; i < WIDTH; i++) ec_arena[i] = x[i];
-  ec_graph_begin();
-  while (!ec_graph_slice(0)) continue;
-  return ec_arena[ec_tasks[0].places.label];
+  if (!ec_model_now.header) ec_open(ec_image);
+  for (uint32_t i = 0; i < WIDTH; i++) ec_vector[i] = x[i];
+  ec_formula_begin();
+  while (!ec_formula_slice(0)) continue;
+  return ec_answers[0].label;
 }

@@ -8,7 +8,6 @@ from types import SimpleNamespace
 
 import pytest
 
-from edge import __version__
 from edge.app.cli import main
 from edge.app.commands import bench
 from edge.app.commands.bench import summary, touch
@@ -43,14 +42,6 @@ def test_every_stage_has_a_median_and_a_99th_percentile(board):
     for stage in board["stages"].values():
         assert 0.0 < stage["median_us"] <= stage["p99_us"]
         assert stage["n"] >= 4
-
-
-def test_memory_cold_start_and_machine_are_named(board):
-    assert 10.0 < board["memory_mb"] < 10_000.0
-    assert board["cold_start_ms"] > 10.0
-    machine = board["machine"]
-    assert machine["kind"]
-    assert machine["edge-classify"] == __version__
 
 
 def test_the_model_is_named_by_its_digest(board, model):

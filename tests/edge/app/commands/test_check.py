@@ -117,19 +117,6 @@ def test_check_says_where_the_wires_are_too_slow(edge, skin):
     assert "asks for 100 Hz, but the wires carry 47.5" in " ".join(event["remarks"])
 
 
-def test_a_person_is_told_each_thing_once(edge, tmp_path, monkeypatch):
-    monkeypatch.setattr("sys.stdout.isatty", lambda: True)
-    path = tmp_path / "skin.toml"
-    path.write_text(mpr121())
-    status, text, err = edge("check", path, text=True)
-    assert status == 0
-    assert err == ""
-    first, *_, last = text.splitlines()
-    assert first == f"{path}: skin, 3 x 4 taxels on 1 chip"
-    assert last.startswith("Remark: not calibrated yet")
-    assert text.count("pitch_m") == 1
-
-
 @pytest.fixture
 def board(tmp_path, monkeypatch):
     """A machine with the given devices, of which one belongs to another group."""
@@ -184,8 +171,8 @@ def test_what_a_board_lacks_comes_with_its_remedy(board, monkeypatch):
 
 def test_check_without_a_skin_prints_the_board(edge, monkeypatch):
     rows = [
-        board_module.Row("disk", "5 MB", "delete"),
-        board_module.Row("python", "3.11"),
+        board_module.Fact("disk", "5 MB", "delete"),
+        board_module.Fact("python", "3.11"),
     ]
     monkeypatch.setattr(board_module, "look", lambda: rows)
     status, (event,), _ = edge("check")

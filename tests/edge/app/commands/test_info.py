@@ -2,10 +2,7 @@
 
 from dataclasses import replace
 
-import pytest
-
 from edge import demo
-from edge.app.commands.info import described, description
 from edge.decide.model import Model
 from edge.decide.summary import UNDOUBTED, doubt
 
@@ -47,9 +44,3 @@ def test_a_person_gets_sentences(edge, monkeypatch):
     assert f"Compares with {INFO.rows} trials" in out
     assert "Of touches of each object that it has not met" in out
     assert max(map(len, out.splitlines())) <= 80
-
-
-@pytest.mark.parametrize("digest", [True, False])
-def test_a_model_without_a_digest_is_said_to_have_none(digest):
-    about = {**described(Model(demo.MODEL)), "digest": digest}
-    assert ("no digest" in description(INFO, about)) != digest

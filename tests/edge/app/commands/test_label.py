@@ -185,18 +185,9 @@ def test_the_last_change_is_taken_back_in_all_of_its_folders(kept, edge, make_to
     assert edge("label", kept, "--undo")[0] == 2
 
 
-def test_what_reads_leaves_a_folder_of_a_former_release_as_it_is_and_names_it(
-    kept, edge
-):
-    change = '{"labels": {"sure.npz": [{}, null]}}'
-    (kept / ".edge-classify-labels.json").write_text(change)
-    (kept / ".edge-classify-deleted").mkdir()
+def test_a_row_whose_recording_is_gone_is_named(kept, edge):
     (kept / TABLE).write_text("file,object\ngone.npz,cup\n")
-    before = sorted(kept.rglob("*"))
     err = edge("label", kept)[2]
-    assert sorted(kept.rglob("*")) == before
-    assert ".edge-classify-labels.json: a change of labels" in err
-    assert ".edge-classify-deleted: recordings that a former release deleted" in err
     assert "labels.csv, line 2: there is no gone.npz here" in err
 
 

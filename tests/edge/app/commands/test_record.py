@@ -17,7 +17,7 @@ from edge.app import review
 from edge.app.commands.record import Recorder, trial_path
 from edge.app.sinks.event_writer import Lines
 from edge.app.source import ending_signals
-from edge.app.trials import Trials
+from edge.app.trials import Segmenter
 from edge.record.recording import load
 from edge.record.saving import save
 from edge.touch.frame import Frame
@@ -121,7 +121,7 @@ def test_record_saves_the_trial_that_has_begun_when_it_is_told_to_end(
     monkeypatch,
     number,
 ):
-    push = Trials.push
+    push = Segmenter.push
     pushed = []
 
     def interrupted(trials, frame):
@@ -130,7 +130,7 @@ def test_record_saves_the_trial_that_has_begun_when_it_is_told_to_end(
             signal.raise_signal(number)
         return push(trials, frame)
 
-    monkeypatch.setattr(Trials, "push", interrupted)
+    monkeypatch.setattr(Segmenter, "push", interrupted)
     before = signal.signal(number, signal.SIG_DFL)  # nohup, for one, has SIGHUP ignored
     try:
         status, (event,), _ = record()

@@ -157,18 +157,6 @@ def test_a_label_cannot_send_escape_sequences_to_the_terminal():
     assert "\\x1b]0;a\\x07" in text
 
 
-def test_two_models_are_compared_on_the_same_recordings(replay, exported, recordings):
-    touches = [recordings / f"{name}.npz" for name in ("hard_0", "soft_0")]
-    status, events, err = replay("--model", exported / "model.onnx", *touches)
-    assert status == 0
-    assert len(decided(events, "task")) == 2 * 2 * 2
-    # Two trials tell nothing.
-    line = "object: 0 gained, 0 lost of 2: +0.0 points (95 % interval -94.3 to +94.3)"
-    assert line in err
-    favoured = f"{exported / 'model.onnx'} was fitted on 2 of these recordings"
-    assert err.count(favoured) == 2
-
-
 def test_a_comparison_counts_what_is_gained_and_lost():
     first = summed(*[("a", "a")] * 4, *[("b", "a")] * 6)
     second = summed(*[("b", "a")] * 2, *[("a", "a")] * 8)

@@ -29,17 +29,6 @@ def test_view_draws_the_skin_at_a_bounded_rate(edge, exported, recordings):
     assert text.endswith("\x1b[0m\x1b[?25h")
 
 
-@pytest.mark.usefixtures("person")
-def test_view_draws_a_picture_each_time_one_is_due(edge, recordings, monkeypatch):
-    """Half a frame early or late, so that a clock that shifts by less does not skip
-    one."""
-    times = []
-    monkeypatch.setattr(view, "draw", lambda frame, *rest: times.append(frame.t) or ".")
-    options = ("--fake", recordings / "hard_0.npz", "--seconds", 0.6)
-    assert edge("view", *options, text=True)[0] == 0
-    assert np.round(np.diff(times), 2).tolist() == [0.1] * 5
-
-
 def test_a_pipe_is_refused(refused, recordings):
     err = refused("view", "--fake", recordings / "hard_0.npz")
     assert "give it a terminal or --web; `edge-classify run` prints JSON lines" in err
@@ -76,15 +65,6 @@ def test_a_taxel_that_cannot_be_read_is_blue():
     valid[2, 3] = False
     colour = drawn(frame((1, 1), valid=valid))[1]
     assert np.argwhere(colour == view.LOST).tolist() == [[2, 3]]
-
-
-def test_two_rows_make_a_line_and_colours_are_sent_where_they_change():
-    text = view.picture(
-        np.array([[1, 1, 2], [3, 3, 3], [4, 4, 4]], dtype=np.uint8), wide=1
-    )
-    assert text == (
-        "\x1b[38;5;1;48;5;3m▀▀\x1b[38;5;2;48;5;3m▀\x1b[0m\n\x1b[38;5;4;49m▀▀▀\x1b[0m"
-    )
 
 
 def test_no_color_draws_digits_by_force(monkeypatch):

@@ -90,25 +90,3 @@ def test_an_address_that_a_driver_of_the_kernel_owns_costs_its_chips_and_is_name
     valid, sentences = process.stdout.splitlines()
     assert valid == f"{384 - 8 * 12} 0"
     assert sentences == "['a driver of the kernel owns the address; unbind it (EBUSY)']"
-
-
-def test_a_bus_that_was_closed_is_gone_and_can_be_opened_again(library):
-    process = run(
-        library,
-        """
-        from edge.wire.bus.linux import LinuxBus
-        from edge.wire.bus.protocol import BusGone, fetch
-        bus = LinuxBus("/dev/i2c-1")
-        bus.close(); bus.close()
-        try:
-            fetch(bus, 0x70, b"", 1)
-        except BusGone as error:
-            print(error)
-        bus.reopen()
-        print(fetch(bus, 0x70, b"", 1))
-        """,
-    )
-    assert process.stdout == (
-        "/dev/i2c-1, address 0x70: the adapter has gone; plug it in again "
-        "(ENODEV)\nb'\\x00'\n"
-    )

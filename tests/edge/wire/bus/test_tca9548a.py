@@ -29,15 +29,6 @@ def bus():
     return muxed()[0]
 
 
-def test_each_channel_is_a_bus_with_its_own_chip():
-    _, mux = muxed()
-    chips = [AD7147(mux.channel(n), 0x2C) for n in range(8)]
-    for chip in chips:
-        list(chip.settings())
-    for n in (3, 3, 0, 7):
-        assert parsed(chips[n])[0].tolist() == [1000 + n] * 12
-
-
 def beside(bus):
     """Both muxes of a bus, which know of each other."""
     muxes = []

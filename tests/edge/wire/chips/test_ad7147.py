@@ -76,17 +76,6 @@ def test_ones_up_to_the_end_are_a_bus_that_nobody_drives_and_ones_before_it_a_va
     assert AD7147.parse(data, SPEC)[1].all()
 
 
-def test_model_converts_in_its_own_time():
-    model = FakeAD7147(
-        lambda t: np.full(12, round(t * 1e6), dtype=np.uint16), timed=True
-    )
-    bus = FakeBus(chips={0x2C: model})
-    chip = AD7147(bus, 0x2C)
-    list(chip.settings())
-    bus.sleep(0.020)
-    assert parsed(chip)[0].tolist() == [18432] * 12
-
-
 def test_every_row_that_is_read_back_tells_a_reset_and_no_value_is_intact():
     model = FakeAD7147(sense)
     chip = AD7147(FakeBus(chips={0x2C: model}), 0x2C)

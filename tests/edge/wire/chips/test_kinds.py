@@ -9,7 +9,9 @@ from edge.errors import InputError
 from edge.wire.chips import kinds
 from edge.wire.chips.chip import Chip, Defaults, Option, Traits
 from edge.wire.chips.kinds import KINDS, Kind
+from edge.wire.chips.mpr121 import MPR121
 from edge.wire.fake.bus import FakeChip
+from edge.wire.fake.player import frame_rate
 from edge.wire.skin import file as skinfile
 from edge.wire.skin.file import Signal, parse
 from tests.edge.wire.skin.small import mpr121, one_chip
@@ -23,16 +25,6 @@ def test_an_mpr121_works_without_a_single_setting():
     assert file.signal == shipped.signal
     layouts = (file.layout, shipped.layout)
     assert {(layout.threshold_counts, layout.onset) for layout in layouts} == {(8, 16)}
-
-
-def test_values_of_the_file_replace_the_defaults():
-    file = parse(
-        mpr121(skin="threshold_counts = 20", signal="sign = 1\ndead_band_counts = 1")
-    )
-    assert file.chips[0].sign == 1
-    assert file.signal.dead_band_counts == 1
-    assert file.layout.threshold_counts == 20
-    assert file.layout.onset == 20
 
 
 def test_chips_of_two_kinds_have_each_its_own_sign_and_only_defaults_that_hold_for_any():
@@ -70,6 +62,20 @@ def test_a_further_kind_is_an_entry_and_an_option_belongs_to_its_kind(monkeypatc
         parse(toy_skin(3))
     with pytest.raises(InputError, match="bus 0 chip 0: unknown key speed"):
         parse(mpr121().replace("first", "speed = 1, first"))
+
+
+class Pad(MPR121):
+    """An owner's chip."""
+
+    name = "pad"
+
+
+def test_an_owners_chip_has_the_time_on_the_wire_that_a_trade_off_counts(monkeypatch):
+    kind = Kind(f"{__name__}.Pad", KINDS["mpr121"].model)
+    monkeypatch.setitem(KINDS, "pad", kind)
+    own = parse(mpr121().replace('"mpr121"', '"pad"'))
+    assert own.chips[0].kind is Pad
+    assert frame_rate(own) == frame_rate(parse(mpr121()))
 
 
 @pytest.mark.parametrize("name", KINDS)

@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 
-from edge.wire.bus.protocol import fetch, send
 from edge.wire.chips import mpr121
 from edge.wire.chips.chip import ChipSpec, WrongChip
 from edge.wire.chips.mpr121 import MPR121
@@ -32,12 +31,6 @@ def test_is_stopped_written_and_started_once(model, chip):
     ecr = [d for d in sent if len(d) == 2 and d[0] == mpr121.ECR]
     assert ecr == [b"\x5e\x00", b"\x5e\x8f"]
     assert sent[0] == b"\x80\x63"
-
-
-def test_model_loses_writes_while_it_runs(chip):
-    list(chip.settings())
-    send(chip.bus, 0x5A, [mpr121.CONFIG2, 0x77])
-    assert fetch(chip.bus, 0x5A, bytes([mpr121.CONFIG2]), 1) == b"\x20"
 
 
 def test_parses_low_byte_first_and_tells_damaged_and_saturated_words():

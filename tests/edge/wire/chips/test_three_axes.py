@@ -6,7 +6,7 @@ import pytest
 
 from edge.errors import InputError
 from edge.wire.chips.block import Block
-from edge.wire.chips.chip import ChipSpec, WrongChip
+from edge.wire.chips.chip import ChipSpec
 from edge.wire.chips.three_axes import ZERO, ThreeAxisBlock, axes
 from edge.wire.fake.block import FakeBlock
 from edge.wire.fake.bus import FakeBus
@@ -53,14 +53,6 @@ def test_the_normal_values_are_parsed_apart_from_the_shear(data):
     assert (values[0].astype(int) - ZERO).tolist() == numbers()[:, 0].tolist()
     shear = axes(data, TAXELS)[0, :, 1:]
     assert (shear.astype(int) - ZERO).tolist() == numbers()[:, 1:].tolist()
-
-
-def test_firmware_of_one_axis_is_not_taken_for_three():
-    bus = FakeBus(
-        chips={0x28: FakeBlock(lambda t: np.zeros(TAXELS, np.uint16), taxels=TAXELS)}
-    )
-    with pytest.raises(WrongChip, match="serves 5 taxels of 16 bits, not 5 taxels of"):
-        ThreeAxisBlock(bus, 0x28, taxels=TAXELS)
 
 
 def test_a_skin_of_three_axes_reads_its_blocks_so():

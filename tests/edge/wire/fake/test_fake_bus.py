@@ -6,7 +6,6 @@ import errno
 import pytest
 
 from edge.wire.bus.protocol import (
-    BusError,
     BusRefused,
     fetch,
     read,
@@ -14,7 +13,7 @@ from edge.wire.bus.protocol import (
     write,
 )
 from edge.wire.fake.bus import FakeChip, FakeTCA9548A
-from tests.faulty import Fault, FaultyBus
+from tests.faulty import FaultyBus
 
 
 class Echo(FakeChip):
@@ -70,29 +69,3 @@ def test_a_mux_connects_at_stop_and_two_chips_at_one_address_pull_the_same_wire(
     assert connected == [[]]
     assert mux.connected == [0, 1]
     assert fetch(fake, 0x20, b"", 1) == bytes([0b1000])
-
-
-def test_time_advances_by_the_bits_only_where_it_is_asked_for():
-    still = bus()
-    timed = bus(timed=True, clock_hz=100_000)
-    for fake in (still, timed):
-        fetch(fake, 0x10, b"\x00", 4)
-        assert fake.bits == 1 + 18 + 1 + 45 + 1
-    assert still.now() == 0.0
-    assert timed.now() == pytest.approx(66 / 100_000)
-
-
-def test_faults_hit_the_transactions_that_they_name_and_a_hung_one_costs_the_timeout():
-    faults = [Fault(code=errno.EIO, at=[1, 3]), Fault(code=errno.ETIMEDOUT, at=[4])]
-    fake = bus(timed=True, clock_hz=1e9, timeout_s=0.03, faults=faults)
-    codes = []
-    for _ in range(6):
-        try:
-            send(fake, 0x10, [0])
-            codes.append(0)
-        except BusError as error:
-            codes.append(error.errno)
-    assert codes == [0, errno.EIO, 0, errno.EIO, errno.ETIMEDOUT, 0]
-    assert fake.transactions == 6
-    assert fake.met == 3
-    assert fake.now() == pytest.approx(0.03, rel=1e-3)

@@ -1,7 +1,6 @@
 """A recording on fake chips: what goes in at the registers comes out as frames."""
 
 import math
-from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -30,15 +29,6 @@ def test_a_skin_of_any_shape_gives_back_its_recording(shape):
     with skin:
         frames = [frame.counts for frame in Loop(skin, lasts_s=playback.ends).frames()]
     np.testing.assert_array_equal(frames, recording.frames)
-
-
-def test_raw_values_saturate_as_a_chip_does():
-    recording = noise((16, 24))
-    file = skin_file(recording.layout)
-    file = replace(file, signal=replace(file.signal, saturation_counts=65535))
-    expected = np.minimum(recording.frames[0], 65534 - 20946)
-    with play(file, recording)[0] as skin:
-        np.testing.assert_array_equal(skin.read().counts, expected)
 
 
 def test_a_playback_holds_each_frame_until_the_next_and_can_start_again():

@@ -10,7 +10,7 @@ from edge.touch.layout import SkinLayout, for_device
 from edge.wire.fake.player import play, skin_file
 from edge.wire.skin.calibration import with_calibration
 from edge.wire.skin.file import Signal, parse
-from edge.wire.skin.shear import SignedBaseline
+from edge.wire.skin.shear import ShearReader, SignedBaseline
 
 LAYOUT = SkinLayout(3, 4, threshold_counts=40, onset_counts=60, axes=3)
 PAD = """
@@ -63,6 +63,20 @@ def test_a_taxel_that_is_not_valid_has_no_shear():
         shear = skin.shear.read(np.arange(12) != 5, settled=False)
     assert not shear.reshape(12, 2)[5].any()
     assert shear.reshape(12, 2)[[4, 6]].any()
+
+
+def test_shear_is_counted_from_the_calibrated_rest_values_beyond_their_noise():
+    every = np.ones(12, dtype=bool)
+    skin, _ = play(skin_file(LAYOUT), touch())
+    with skin:
+        shear = skin.read().shear.astype(int)
+        calibration = skin.file.calibration
+        calibration.shear_baseline[:] = (1 << 15) - 2768
+        calibration.shear_noise[0, 0] = 1e6
+        again = ShearReader(skin.file, skin._decoder.rows).read(every, settled=False)
+    expected = np.minimum(shear + 2768, 32767)
+    expected[0, 0] = 0
+    assert again.tolist() == expected.tolist()
 
 
 def test_a_calibration_of_three_axes_is_written_and_read_back():
