@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
 from edge.arrays import Array, Floats
+from edge.decide.knn import Constants
 from edge.decide.model import Model
 from export.image import NOWHERE, Pools, record
 
@@ -59,8 +59,7 @@ class Formula:
 
     def _at(self, name: str, point: int, axes: int) -> Floats:
         """A constant of so many axes at a decision point."""
-        value = self._constants[name]
-        return np.asarray(value[point] if value.ndim > axes else value, float)
+        return np.asarray(Constants(self._constants, point).numbers(name, axes), float)
 
     def _weigh(self, projection: Array) -> None:
         count = int(projection["count"][0])
@@ -70,11 +69,8 @@ class Formula:
     def _part(self, space: int, point: int) -> tuple[str, int]:
         """How the constants of a space at a decision point are called, and their place
         among those that are called so."""
-        names = re.findall(
-            rf"means of space {space} from (\d+)", "\n".join(self._constants)
-        )
-        start = max(int(start) for start in names if int(start) <= point)
-        return f"of space {space} from {start}", point - start
+        first, name = Constants(self._constants, point).projection(space)
+        return name, point - first
 
     def _projections(self, point: int) -> list[Array]:
         """The `ec_projection` of each space at a decision point."""
