@@ -234,6 +234,7 @@ class Source:
             debounce=info.debounce,
             repeats=info.repeats,
             early=early,
+            calibrated=info.novelty is not None,
             naming=self._naming(),
             text=self._pools.text(info.name or ""),
             checksum=checksum(model) if self._formula.spaces else 0,
