@@ -3,8 +3,8 @@ test notices.
 
 Each of the `ROOMS` draws `--count` words of Python or C that have another in `WORDS`
 from a stream of its own. In a copy of the checkout a word is exchanged, the room's tests
-run, and the word is put back. The exit status is 1 if more than one of 50 changes of a
-room is not noticed. The tables are in docs/measured/.
+run, with the examples of its docstrings, and the word is put back. The exit status is 1
+if more than one of 50 changes of a room is not noticed. The tables are in docs/measured/.
 """
 
 import os
@@ -74,9 +74,7 @@ ROOMS = {
         "tests/edge/app/sinks/test_page.py tests/edge/app/sinks/test_web.py",
     ),
     "model-in-c": Room(
-        "export/c/*.c",
-        "tests/export/test_c_code.py tests/export/test_image.py "
-        "tests/edge/decide/test_knn.py",
+        "export/c/*.c", "tests/export/test_c_code.py tests/export/test_image.py"
     ),
     "skin-in-c": Room("export/c/skin/*.c", "tests/export/test_skin_code.py"),
 }
@@ -146,7 +144,10 @@ def passes(room, folder):
     The process is forked, because the imports take most of the time.
     """
     slow = "slow or not slow" if room.endswith("-c") else "not slow"
-    words = ["-qx", "-p", "no:cacheprovider", "-m", slow, *ROOMS[room].tests.split()]
+    files = [str(path) for path in folder.glob(ROOMS[room].files)]
+    examples = ["--doctest-modules", *files] if files[0].endswith(".py") else []
+    options = ["-qx", "-p", "no:cacheprovider", "-m", slow]
+    words = [*options, *ROOMS[room].tests.split(), *examples]
     process = get_context("fork").Process(target=tested, args=(folder, words))
     process.start()
     process.join(LONGEST_S)

@@ -4,7 +4,10 @@ import argparse
 import sys
 
 from edge.app.cli import dispatch
-from edge.app.options import seconds, within
+from edge.app.options import within
+
+LEAST = {int: 1, float: 1e-3}
+"""Of an option, unless its default is less."""
 
 
 def kind_of(default):
@@ -17,11 +20,11 @@ def kind_of(default):
         return {"type": default, "required": True}
     if isinstance(default, bool):
         return {"action": "store_true"}
-    if isinstance(default, int):
-        return {"type": within(int, min(default, 1), 1e6), "default": default}
-    if isinstance(default, float):
-        return {"type": seconds, "default": default}
-    return {"type": type(default), "default": default}
+    kind = type(default)
+    if kind in LEAST:
+        least = min(default, LEAST[kind])
+        return {"type": within(kind, least, 1e6), "default": default}
+    return {"type": kind, "default": default}
 
 
 def start(measure, description, *options):

@@ -44,6 +44,7 @@ def test_a_picture_has_the_skin(picture):
     assert picture["dead"] == (5,)
     assert np.flatnonzero(picture["counts"]).tolist() == [8, 9]
     assert picture["invalid"] == [18]
+    assert (picture["choices"], picture["decides"]) == ({}, False)
 
 
 def test_a_picture_has_the_contact_since_onset(picture):
@@ -62,12 +63,12 @@ def test_a_picture_has_shear_where_the_skin_gives_it(page, pictures):
 
 
 def test_a_picture_has_the_rate_of_the_loop(page, pictures):
-    median = {50: 0.0125}.__getitem__
+    median = {50: 0.016}.__getitem__
     page.schedule = SimpleNamespace(
         missed_ticks=3, periods=SimpleNamespace(percentile=median)
     )
     page.push(next(frames()))
-    assert (pictures[0]["rate_hz"], pictures[0]["missed"]) == (80.0, 3)
+    assert (pictures[0]["rate_hz"], pictures[0]["missed"]) == (62.5, 3)
 
 
 @pytest.mark.parametrize("folder", ["RUNTIME_DIRECTORY", "XDG_RUNTIME_DIR"])
@@ -155,12 +156,15 @@ def test_labels_and_recording_are_set_from_the_page(page):
     with pytest.raises(InputError, match="give a label first"):
         act(page, "record", on=True)
 
-    act(page, "labels", labels={" object ": f"{'b' * 80} "})
-    assert page.labels == {"object": "b" * 80}
+    act(page, "labels", labels={" o ": f"{'b' * 80} "})
+    assert page.labels == {"o": "b" * 80}
     assert not page.recording
 
     act(page, "record", on=True)
     assert page.recording
+
+    act(page, "unlabel", task="o")
+    assert not page.recording
 
 
 @pytest.mark.parametrize(
@@ -193,13 +197,16 @@ def test_a_label_that_is_given_leaves_those_of_other_tasks(page):
     assert page.labels == {"softness": "soft"}
 
 
-def test_recording_waits_for_the_choice_of_a_label(serve):
-    page = serve(labels={"object": "box", "softness": None})
+@pytest.mark.parametrize("others", [{}, {"object": "box"}])
+def test_recording_waits_for_the_choice_of_a_label(serve, others):
+    assert serve(labels={"object": "box"}).recording
+    page = serve(labels={**others, "softness": None})
+    assert not page.recording
     with pytest.raises(InputError, match="give softness first"):
         act(page, "record", on=True)
     act(page, "labels", labels={"softness": "soft"})
     assert page.recording
-    assert page.labels == {"object": "box", "softness": "soft"}
+    assert page.labels == {**others, "softness": "soft"}
 
 
 def test_a_page_without_a_folder_changes_nothing(serve):
@@ -297,11 +304,14 @@ def test_a_decision_is_accepted_and_corrected_with_undo(kept_page, touch_folder)
 
 def test_what_is_doubtful_stands_beside_its_touch_and_the_next_labels(folder_page):
     change(folder_page, "relabel", "a.npz", labels={"category": "rigid-fixed"})
-    act(folder_page, "labels", labels={"category": "soft-movable"})
+    wrong = {"category": "rigid-movable", "softness": "soft", "mobility": "fixed"}
+    act(folder_page, "labels", labels=wrong)
     answer = act(folder_page, "trials")
     doubtful = {touch["file"] for touch in answer["trials"] if touch["doubts"]}
     assert doubtful == {"a.npz"}
-    assert answer["doubts"] == []
+    assert [text.split()[0] for text in answer["doubts"]] == [
+        "category='rigid-movable'"
+    ]
 
 
 def test_touches_that_come_into_the_folder_are_shown(
@@ -318,5 +328,8 @@ def test_a_picture_tells_when_the_list_has_changed(folder_page, pictures):
     folder_page.push(still)
     change(folder_page, "leave_out", "a.npz")
     folder_page.push(replace(still, t=1.0))
-    before, after = (picture["trials"] for picture in pictures)
-    assert after > before
+    folder_page.saved()
+    folder_page.push(replace(still, t=2.0))
+    assert pictures[0]["invalid"] == []
+    before, changed, saved = (picture["trials"] for picture in pictures)
+    assert saved > changed > before

@@ -51,7 +51,7 @@ def test_a_whole_skin_is_read_through_the_ioctl_path(library, tmp_path):
     assert log.read_text() == "timeout 1\n" * 3
 
 
-def test_a_call_that_the_kernel_completes_in_part_is_no_reading(library):
+def test_a_call_that_the_kernel_completes_in_part_is_no_reading(library, tmp_path):
     """Its buffer still holds the former reading: old values must not pass for new
     ones."""
     process = run(
@@ -60,14 +60,16 @@ def test_a_call_that_the_kernel_completes_in_part_is_no_reading(library):
         import os
         from edge.wire.bus.linux import LinuxBus
         from edge.wire.bus.protocol import BusFault, fetch
-        bus = LinuxBus("/dev/i2c-1")
+        bus = LinuxBus("/dev/i2c-1", timeout_s=0.05)
         try:
             fetch(bus, 0x70, b"\\0", 1)
         except BusFault as error:
             print(error)
         """,
         I2CDEV_SHORT="0x70",
+        I2CDEV_LOG=str(tmp_path / "log"),
     )
+    assert (tmp_path / "log").read_text() == "timeout 5\n"
     assert process.stdout.startswith(
         "/dev/i2c-1, address 0x70: the transfer broke off"
     ), process.stderr

@@ -63,6 +63,7 @@ def test_every_mux_that_another_program_opened_is_closed():
     for address in addresses:
         muxes.append(TCA9548A(bus, address, beside=muxes))
     muxes[0].select(3)
+    assert muxes[0].kept()
     for address in addresses[1:]:
         bus.transfer(bus.prepare(write(address, b"\x08")))
     assert not muxes[0].kept()

@@ -148,6 +148,27 @@ def test_the_next_frame_after_another_program_selected_channels_is_valid(
     assert Pattern(SMALL).wrong(frame) == 0
 
 
+def test_the_only_channel_of_a_mux_is_selected_again_within_the_frame():
+    buses = [replace(bus, chips=bus.chips[:2]) for bus in SMALL.buses]
+    file = replace(SMALL, buses=tuple(buses))
+    with faulty_skin(file, Pattern(file), timed=True) as skin:
+        skin.read()
+        for reader in skin.readers:
+            mux = reader.bus.chips[0x70]
+            mux.write(bytes([1 << 3]), 0.0)
+            mux.stop()
+        frame = skin.read()
+    assert frame.valid.sum() == 4 * 12
+    assert Pattern(file).wrong(frame) == 0
+
+
+def test_after_a_frame_each_selection_is_read_back_again(running):
+    skin, _, _ = running
+    skin.read()
+    for reader in skin.readers:
+        assert [mux.verify for mux in reader._muxes.values()] == [True]
+
+
 def test_a_damaged_stage_register_is_found_by_reading_the_stages_in_turn(running):
     """13 rows of 4 chips, one every 4 frames; the values meanwhile look plausible."""
     skin, model, slot = running

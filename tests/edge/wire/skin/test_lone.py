@@ -105,3 +105,8 @@ def test_it_has_five_living_neighbours_as_a_pad_of_a_glove_is_touched_alone(
     shape, place, more, is_judged
 ):
     assert bool(changes("A" * 6, shape, place, **more)) == is_judged
+
+
+@pytest.mark.parametrize(("wraps", "frames"), [(True, []), (False, [5])])
+def test_a_neighbour_beyond_the_seam_is_beside_it(wraps, frames):
+    assert changes("B" * 6, (4, 6), (2, 0), wraps=wraps) == frames

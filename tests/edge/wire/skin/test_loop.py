@@ -34,6 +34,14 @@ def test_a_late_tick_moves_no_other_and_those_gone_by_are_counted():
     assert schedule.periods.percentile(100) == pytest.approx(0.025, abs=2e-5)
 
 
+def test_a_tick_that_comes_with_the_next_one_is_left_out():
+    clock = VirtualClock()
+    schedule = Schedule(clock, 0.25)
+    schedule.wait(Stop())
+    clock.sleep_until(clock.now() + 0.5)
+    assert (schedule.wait(Stop()) - schedule.start, schedule.missed_ticks) == (0.5, 1)
+
+
 def test_a_long_wait_looks_now_and_then_whether_to_end():
     clock = VirtualClock()
     schedule = Schedule(clock, 1.0)

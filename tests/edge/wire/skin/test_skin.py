@@ -110,9 +110,9 @@ def test_the_baseline_follows_what_is_held_for_ten_windows():
     assert counts[round(start + 15.0, 2)] in range(258, 263)
 
 
-def test_a_skin_without_a_single_chip_says_so():
+def test_a_skin_whose_only_chip_does_not_answer_says_so():
     clock = VirtualClock()
-    file = calibrated(PAD)
+    file = replace(calibrated(PAD), buses=(replace(PAD.buses[0], chips=PAD.chips[:1]),))
     buses = faulty_buses(file, lambda t: PICTURE, clock, faults=[Fault()])
     skin = Skin(file, buses, clock=clock)
     with (
