@@ -233,7 +233,7 @@ wheel-test: $(DEV) wheel
 
 c-test: $(DEV)
 	$(BIN)/python -m pytest tests/export/test_c_code.py tests/edge/decide/test_knn.py \
-	  tests/export/test_skin_code.py -rs
+	  tests/export/test_image.py tests/export/test_skin_code.py -rs
 
 kernel-test: $(DEV)
 	$(BIN)/python -m pytest tests/board/test_kernel.py -rs --capture=tee-sys

@@ -234,6 +234,7 @@ class Source:
             debounce=info.debounce,
             repeats=info.repeats,
             early=early,
+            calibrated=info.novelty is not None,
             naming=self._naming(),
             text=self._pools.text(info.name or ""),
             checksum=checksum(model) if self._formula.spaces else 0,
@@ -550,6 +551,8 @@ def lacks(info: ModelInfo) -> Iterable[str]:
     layout = info.layout
     if layout.axes:
         yield "it takes no shear"
+    if info.scorer != "knn":
+        yield f"its scorer is {info.scorer}"
     if info.onset:
         yield "it finds the onset of a touch by the skin alone"
     total = layout.rows * layout.cols * 65535

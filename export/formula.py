@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
 from edge.arrays import Array, Floats
+from edge.decide.knn import Constants
 from edge.decide.model import Model
 from export.image import NOWHERE, Pools, record
 
@@ -41,73 +41,67 @@ class Formula:
         Raises:
             InputError: C cannot take a number.
         """
-        self._constants = model.contents.constants
+        arrays = model.contents.constants
+        self._points = {point: Constants(arrays, point) for point in points}
+        at = self._points[points[-1]]
         self._width = model.info.width
         self._pools = pools
         tasks = model.info.tasks
-        self.spaces = 1 + max(int(self._constants[f"space of {t}"]) for t in tasks)
-        self.trials = max(len(self._constants[f"labels of {t}"]) for t in tasks)
+        self.spaces = 1 + max(map(at.space, tasks))
+        self.trials = max(len(at.numbers(f"labels of {t}", 1)) for t in tasks)
         self.nearest = 0
         self.work = dict.fromkeys(WORK, 0)
-        self.projections = [p for point in points for p in self._projections(point)]
-        self.components = max(int(p["components"][0]) for p in self.projections)
-        for task in tasks:
-            coordinates = self._constants[f"coordinates of {task}"]
-            self.components = max(self.components, coordinates.shape[-2])
+        self.projections = [
+            made for point in points for made in self._projections(self._points[point])
+        ]
+        widths = [len(at.numbers(f"coordinates of {task}", 2)) for task in tasks]
+        self.components = max(
+            widths + [int(p["components"][0]) for p in self.projections]
+        )
         for of_space in self.projections[-self.spaces :]:
             self._weigh(of_space)
-
-    def _at(self, name: str, point: int, axes: int) -> Floats:
-        """A constant of so many axes at a decision point."""
-        value = self._constants[name]
-        return np.asarray(value[point] if value.ndim > axes else value, float)
 
     def _weigh(self, projection: Array) -> None:
         count = int(projection["count"][0])
         self.work["row"] += count
         self.work["product"] += count * int(projection["components"][0])
 
-    def _part(self, space: int, point: int) -> tuple[str, int]:
-        """How the constants of a space at a decision point are called, and their place
-        among those that are called so."""
-        names = re.findall(
-            rf"means of space {space} from (\d+)", "\n".join(self._constants)
-        )
-        start = max(int(start) for start in names if int(start) <= point)
-        return f"of space {space} from {start}", point - start
-
-    def _projections(self, point: int) -> list[Array]:
+    def _projections(self, at: Constants) -> list[Array]:
         """The `ec_projection` of each space at a decision point."""
         means: list[tuple[Floats, Array]] = []
         places = []
         for space in range(self.spaces):
-            name, at = self._part(space, point)
+            first, name = at.projection(space)
             wide = np.zeros(self._width)
             mine = np.zeros(self._width, bool)
-            columns = self._constants.get(f"columns {name}", np.arange(self._width))
-            wide[columns] = self._at(f"means {name}", at, 1)
+            columns: Any = slice(None)
+            if f"columns {name}" in at:
+                columns = at.numbers(f"columns {name}", 1)
+            wide[columns] = at.numbers(f"means {name}", 1, first)
             mine[columns] = True
             places.append(_shared(means, wide, mine))
         series = [self._pools.series(wide) for wide, _ in means]
         return [
-            self._projection(space, point, series[place])
+            self._projection(space, at, series[place])
             for space, place in enumerate(places)
         ]
 
-    def _projection(self, space: int, point: int, means: Array) -> Array:
-        name, at = self._part(space, point)
-        weights = self._at(f"weights {name}", at, 2)
+    def _projection(self, space: int, at: Constants, means: Array) -> Array:
+        first, name = at.projection(space)
+        weights = at.numbers(f"weights {name}", 2, first)
         used = int(np.flatnonzero(weights.any(0)).max(initial=0)) + 1
         matrix, shift = self._pools.matrix(weights[:, :used])
-        columns = self._constants.get(f"columns {name}")
+        columns = NOWHERE
+        if f"columns {name}" in at:
+            columns = self._pools.add("words", at.numbers(f"columns {name}", 1))
         return record(
             "ec_projection",
-            most_steps=self._at("most steps", point, 0),
+            most_steps=at.numbers("most steps"),
             factor=2.0**-shift,
-            limit=self._at(f"limits of space {space}", point, 0),
+            limit=at.numbers(f"limits of space {space}"),
             means=means,
-            gains=self._pools.series(self._at(f"gains {name}", at, 1)),
-            columns=NOWHERE if columns is None else self._pools.add("words", columns),
+            gains=self._pools.series(at.numbers(f"gains {name}", 1, first)),
+            columns=columns,
             matrix=matrix,
             count=len(weights),
             components=used,
@@ -116,30 +110,31 @@ class Formula:
     def doubt(self, point: int, limits: dict[str, float]) -> Array:
         """The `ec_doubt` of a decision point, with the limits of the scores."""
         pools = self._pools
-        weights = self._at("novelty weights", point, 2)
+        at = self._points[point]
+        weights = at.numbers("novelty weights", 2)
         matrix, shift = pools.matrix(weights)
         projection = record(
             "ec_projection",
-            most_steps=self._at("novelty most steps", point, 0),
-            factor=self._at("novelty factor", point, 0) * 2.0**-shift,
-            means=pools.series(self._at("novelty means", point, 1)),
-            gains=pools.series(self._at("novelty gains", point, 1)),
+            most_steps=at.numbers("novelty most steps"),
+            factor=at.numbers("novelty factor") * 2.0**-shift,
+            means=pools.series(at.numbers("novelty means", 1)),
+            gains=pools.series(at.numbers("novelty gains", 1)),
             columns=NOWHERE,
             matrix=matrix,
             count=len(weights),
             components=weights.shape[1],
         )
-        whitening, fine = pools.matrix(self._at("novelty whitening", point, 2))
-        rows, _ = pools.matrix(self._at("novelty coordinates", point, 2) / -2.0)
-        squares = self._at("remoteness weights", point, 1) ** 2
+        whitening, fine = pools.matrix(at.numbers("novelty whitening", 2))
+        rows, _ = pools.matrix(at.numbers("novelty coordinates", 2) / -2.0)
+        squares = at.numbers("remoteness weights", 1) ** 2
         self.components = max(self.components, weights.shape[1])
         return record(
             "ec_doubt",
             projection=projection,
-            factor=self._at("novelty whitening factors", point, 0) * 2.0**-fine,
-            limit=self._at("novelty limit", point, 0),
-            nearness=pools.series(self._at("novelty nearness", point, 1)),
-            weighted_nearness=pools.series(self._at("remoteness nearness", point, 1)),
+            factor=at.numbers("novelty whitening factors") * 2.0**-fine,
+            limit=at.numbers("novelty limit"),
+            nearness=pools.series(at.numbers("novelty nearness", 1)),
+            weighted_nearness=pools.series(at.numbers("remoteness nearness", 1)),
             whitening=whitening,
             rows=rows,
             weights=pools.add("words", squares * 2.0**FRACTION_BITS),
@@ -156,17 +151,16 @@ class Formula:
 
     def place(self, task: str, point: int, curve: Sequence[float]) -> Array:
         """The `ec_place` of a task at a decision point, with its curve of confidence."""
-        coordinates = self._at(f"coordinates of {task}", point, 2) / -2.0
-        mask = f"mask of {task}"
-        if mask in self._constants:
-            coordinates = coordinates[self._at(mask, point, 1) > 0.0]
+        at = self._points[point]
+        coordinates = at.numbers(f"coordinates of {task}", 2) / -2.0
+        if f"mask of {task}" in at:
+            coordinates = coordinates[at.numbers(f"mask of {task}", 1) > 0.0]
         rows, _ = self._pools.matrix(coordinates)
         scales = f"scales of {task}"
-        space = int(self._constants[f"space of {task}"])
         return record(
             "ec_place",
-            unit=self._at("units", point, 1)[space],
-            scale=self._at(scales, point, 0) if scales in self._constants else 0.0,
+            unit=at.numbers("units", 1)[at.space(task)],
+            scale=at.numbers(scales) if scales in at else 0.0,
             curve=curve,
             rows=rows,
             components=len(coordinates),
@@ -174,19 +168,22 @@ class Formula:
 
     def task(self, task: str) -> dict[str, Any]:
         """Fields of an `ec_task`."""
-        labels = self._constants[f"labels of {task}"]
-        counts = self._constants.get(f"counts of {task}")
-        nearest = 0 if counts is None else int(counts.sum())
-        self.nearest = max(self.nearest, nearest)
-        self.work["root"] += nearest
+        at = [*self._points.values()][-1]
+        labels = at.numbers(f"labels of {task}", 1)
         add = self._pools.add
-        width = self._constants[f"coordinates of {task}"].shape[-2]
+        counts = NOWHERE
+        if f"scales of {task}" in at:
+            of_labels = at.numbers(f"counts of {task}", 1)
+            counts = add("words", of_labels)
+            self.nearest = max(self.nearest, int(of_labels.sum()))
+            self.work["root"] += int(of_labels.sum())
+        width = len(at.numbers(f"coordinates of {task}", 2))
         self.work["trial"] += len(labels)
         self.work["square"] += len(labels) * width
         return {
             "trials": add("words", np.where(labels < 0, NO_LABEL, labels)),
-            "counts": NOWHERE if counts is None else add("words", counts),
-            "space": int(self._constants[f"space of {task}"]),
+            "counts": counts,
+            "space": at.space(task),
         }
 
 

@@ -28,7 +28,7 @@ def bar(iterable: Iterable[Any] | None = None, **options: Any) -> Any:
     if sys.stderr.isatty() or options.get("disable"):
         return tqdm(iterable, **options)
     often = {"delay": FIRST_S, "mininterval": LOG_S, "maxinterval": LOG_S}
-    progress = tqdm(iterable, file=LogLines(), **often, **options)
+    progress = tqdm(iterable, file=LogLines(), position=0, **often, **options)
     progress.last_print_t -= LOG_S - FIRST_S
     return progress
 

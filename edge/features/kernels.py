@@ -31,8 +31,7 @@ from edge.touch.layout import SkinLayout
 
 SAMPLES = 120
 """Times of the window at which a channel is taken: 100 a second in the usual window.
-At a third of them kernels recognise 1 to 6 % fewer touches, as fast changes escape
-them (13 sets)."""
+Fast changes escape fewer of them."""
 TAPS = 9
 BITS = 14
 """Bits of a channel's values; larger values are cut off."""

@@ -29,12 +29,12 @@ def length_floor(layout: SkinLayout) -> float:
     return MOTION_FLOOR * layout.pitch[0]
 
 
-def one(_: SkinLayout) -> float:
+def unit_floor(_: SkinLayout) -> float:
     """The floor of quantities without a floor of their own."""
     return 1.0
 
 
-def none(_: SkinLayout) -> float:
+def no_floor(_: SkinLayout) -> float:
     """The floor of quantities that are always above 0."""
     return 0.0
 
@@ -69,7 +69,7 @@ class Quantity:
     zone: str = ""
     zones: tuple[str, ...] = ()
     signed: bool = False
-    floor: Callable[[SkinLayout], float] = one
+    floor: Callable[[SkinLayout], float] = unit_floor
     motion: str = ""
     cells: Callable[[SkinLayout], Cells] | None = None
     kernels: int = 0
@@ -144,7 +144,7 @@ ALONE = {
             "",
             zone="skin",
             zones=("contact", "skin"),
-            floor=none,
+            floor=no_floor,
             motion="force_motion",
         ),
         Quantity(

@@ -48,6 +48,7 @@ static double margin(uint32_t index) {
 }
 
 static double excess(void) {
+  if (!EC_HAS_NOVELTY) return 0.0;
   double typical = ec_model_now.doubts[question.point].typical;
   double score = ec_scores_now.novelty;
   return score > typical && typical > 0.0 ? ec_log(score / typical) : 0.0;
@@ -129,10 +130,11 @@ static void ask(uint32_t index, bool refused) {
   a->flags |= flag(of_model->distances[0] == 0.0, EC_AS_TRAINED);
   a->flags |= flag(ties > 1, EC_TIE);
   a->confidence = EC_NAN;
-  if (!EC_HAS_NOVELTY) return;
+  if (!EC_NUMBER(calibrated)) return;
   double likely = confidence(ec_model_now.places[question.point * EC_TASKS + index].curve, index);
   if (index == EC_NAMING) likely *= known();
   a->confidence = rounded(likely);
+  if (!EC_HAS_NOVELTY) return;
   a->flags |= flag(ec_scores_now.novelty > doubt->novel, EC_UNUSUAL);
   if (index == EC_NAMING && ec_scores_now.remoteness > doubt->remote) withhold(a);
 }

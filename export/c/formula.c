@@ -4,7 +4,7 @@
 #include "internal.h"
 
 /* What a slice does about, in products; what a feature and a trial take beside these. */
-#define SLICE 2048
+#define SLICE 1536
 #define SHARE 16
 
 #define COMPONENTS EC_AT_LEAST_1(EC_MOST_COMPONENTS)
@@ -34,7 +34,6 @@ static struct {
   uint32_t part;
   uint32_t begin; /* of the part's features or trials, which the next slice takes */
   uint32_t end;
-  uint32_t count;
   const uint8_t *row; /* of a matrix, the next */
 } now;
 
@@ -238,9 +237,22 @@ static void measure(const ec_task *task, const ec_place *place, ec_answer *a) {
   }
 }
 
+static void answer(const ec_task *task, const ec_place *place, ec_answer *a) {
+  vote(task, a);
+  measure(task, place, a);
+  if (spaces[task->space].excess <= DBL_MAX) return;
+  a->label = -1;
+  for (uint32_t i = 0; i < task->labels; i++) a->votes[i] = 0;
+}
+
+/* The trials, slice by slice, and then what follows from the nearest. */
 static bool task_of_trials(const ec_task *task, const ec_place *place, ec_answer *a) {
   const int32_t *z = spaces[task->space].coordinates;
-  bool is_last = take(EC_TRIALS, 2 * place->components);
+  if (now.begin == EC_TRIALS) {
+    answer(task, place, a);
+    return true;
+  }
+  take(EC_TRIALS, 2 * place->components);
   if (now.begin == 0) {
     for (uint32_t i = 0; i <= EC_MOST_NEAREST; i++) nearest[i] = EC_INFINITY;
     for (uint32_t i = 0; i < task->k; i++) near_squares[i] = EC_INFINITY;
@@ -252,13 +264,7 @@ static bool task_of_trials(const ec_task *task, const ec_place *place, ec_answer
     for (uint32_t i = 0; i < place->components; i++) sum += squared(i, trial, z[i]);
     meet(task, a, trial, (double)sum);
   }
-  if (!is_last) return false;
-  vote(task, a);
-  measure(task, place, a);
-  if (spaces[task->space].excess <= DBL_MAX) return true;
-  a->label = -1;
-  for (uint32_t i = 0; i < task->labels; i++) a->votes[i] = 0;
-  return true;
+  return false;
 }
 
 /* Before the first slice. */

@@ -32,6 +32,8 @@ typedef struct {
   uint32_t early;
   uint32_t naming; /* the task that names things; EC_NOWHERE: none is unknown */
   uint32_t text; /* the name of the model */
+  uint32_t calibrated; /* whether answers have a confidence */
+  uint32_t unused;
   uint64_t checksum; /* of the outputs for features that are all EC_PROBE */
 } ec_numbers;
 

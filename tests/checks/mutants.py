@@ -74,7 +74,7 @@ ROOMS = {
         "tests/edge/app/sinks/test_page.py tests/edge/app/sinks/test_web.py",
     ),
     "model-in-c": Room(
-        "export/c/*.c", "tests/export/test_c_code.py tests/edge/decide/test_knn.py"
+        "export/c/*.c", "tests/export/test_c_code.py tests/export/test_image.py"
     ),
     "skin-in-c": Room("export/c/skin/*.c", "tests/export/test_skin_code.py"),
 }

@@ -46,6 +46,7 @@ from tests.export.microcontroller.recordings import (
 )
 from tests.export.test_early_stopping import pressed
 from train.data.feature_sets import expand, unit
+from train.importers import sdh2
 
 
 @pytest.fixture(scope="module")
@@ -406,6 +407,26 @@ def test_a_stream_of_any_rate_has_the_same_events(early, tmp_path):
             assert_same_events(model, tmp_path, command, streams, error_rate, slices)
     kinds = {kind for s in streams for kind in machine.events(model, s)[:, 0].tolist()}
     assert kinds == {0.0, 1.0, 2.0}
+
+
+EVERY = 24
+"""Of the real grasps one of so many is decided; with 1 all 856 have the same events."""
+
+
+@pytest.mark.slow
+@needs_gcc
+def test_real_grasps_have_the_same_events(real, tmp_path):
+    grasps = [sdh2.grasp(file) for file in sdh2.files(real / "sdh2_grasps")[::EVERY]]
+    for i, grasp in enumerate(grasps[: 856 // 24]):
+        labels = {"object": f"{i % 4}"}
+        trained = replace(grasp, meta={**grasp.meta, "labels": labels})
+        save(tmp_path / "data" / f"{i:03d}.npz", trained)
+    words = ["--features", "contact", "moments", "--quick", "--window", "1.2"]
+    out = export(tmp_path / "out", "--data", tmp_path / "data", *words)
+    model = Model(out / "model.onnx")
+    c_code.export(model, tmp_path / "c")
+    command = machine.compiled(tmp_path / "c")
+    assert_same_events(model, tmp_path / "c", command, grasps)
 
 
 @pytest.mark.slow

@@ -33,7 +33,10 @@ def test_stages_share_a_bar_and_are_lines_of_the_log(capsys, monkeypatch, caplog
     ):
         for name in ("first", "second"):
             with stage(name):
-                pass
-    shares = [line.split()[1] for line in capsys.readouterr().err.splitlines()]
+                list(progress.bar(range(3), desc="within"))
+    err = capsys.readouterr().err
+    assert "\x1b" not in err  # a cursor goes nowhere in a log
+    lines = [line for line in err.splitlines() if line.startswith("export")]
+    shares = [line.split()[1] for line in lines]
     assert [share for share in shares if share != "0%"][:2] == ["75%", "100%"]
     assert [record.args[0] for record in caplog.records] == ["first", "second"]

@@ -79,6 +79,19 @@ class Measured:
     onsets: list[float]
 
 
+class OnDisk(list[Samples]):
+    """Numbers in temporary files, of which the memory holds one trial's at a time."""
+
+    def __init__(self, scratch: Scratch, trials: Sequence[Measured]) -> None:
+        super().__init__(trial.samples for trial in trials)
+        self._scratch = scratch
+
+    def __iter__(self) -> Iterator[Samples]:
+        for samples in super().__iter__():
+            yield samples
+            self._scratch.release()
+
+
 def trials(
     path: Path,
     arm: Chain | None,
@@ -110,7 +123,8 @@ def trials(
     kind = mode(trial.meaning.kind for trial in measured)
     yield from _odd(measured, kind)
     alike = [trial for trial in measured if trial.meaning.kind == kind]
-    yield from _recorded(path, folder, arm, alike, options)
+    samples = OnDisk(scratch, alike)
+    yield from _recorded(path, arm, alike, samples, options)
 
 
 def _odd(trials: Sequence[Measured], kind: str) -> Iterator[Refused]:
@@ -251,18 +265,18 @@ def _with_joints(
 
 def _recorded(
     path: Path,
-    folder: Path,
     arm: Chain | None,
     trials: Sequence[Measured],
+    samples: OnDisk,
     options: TableOptions,
 ) -> Iterator[Trial | Refused]:
     """The recordings of trials of the same columns; prints the columns used and
     ignored."""
+    folder = path if path.is_dir() else path.parent
     names = [_name(place.relative_to(folder)) for place in folder.rglob("*")]
     labels = labels_of([trial.place for trial in trials], folder, options, names)
     yield from map(Refused, labels.slips)
     skin = json_table(folder / SKIN)
-    samples = [trial.samples for trial in trials]
     if trials[0].meaning.are_all:
         _require_taxels(samples, trials[0].meaning.taxels)
     shape = _announced(trials, skin, labels, options)
@@ -270,12 +284,12 @@ def _recorded(
     counts = options.counts or options.onset is not None
     rest = rest_of(samples, replace(options, counts=counts))
     common = {"skin": skin.raw, "source": path.name}
-    for trial, trial_labels in zip(trials, labels.of, strict=True):
+    for trial, values, trial_labels in zip(trials, samples, labels.of, strict=True):
         name = trial.place.name
         meta = common | {"trial": name, "labels": dict(trial_labels)}
         meta |= _meta(trial, arm, options)
         if name not in labels.left_out:
-            recordings = map(rest.recording, [trial.samples], [shape], [meta])
+            recordings = map(rest.recording, [values], [shape], [meta])
             yield from _tried(map(Trial, [name], recordings))
 
 
@@ -326,11 +340,16 @@ def _require_taxels(trials: Sequence[Samples], taxels: Sequence[str]) -> None:
     """
     if min(len(trial.t) for trial in trials) < FEWEST_ROWS:
         return
-    steps = [np.diff(trial.values[..., 0], axis=0) for trial in trials]
-    rises = np.all([(step > 0.0).all(axis=0) for step in steps], axis=0)
-    stays = np.all([(step == 0.0).all(axis=0) for step in steps], axis=0)
-    starts = [trial.values[0, :, 0] for trial in trials]
-    doubtful = rises | (stays & (np.ptp(starts, axis=0) > 0.0))
+    rises = []
+    stays = []
+    starts = []
+    for trial in trials:
+        steps = np.diff(trial.values[..., 0], axis=0)
+        rises.append((steps > 0.0).all(axis=0))
+        stays.append((steps == 0.0).all(axis=0))
+        starts.append(trial.values[0, :, 0])
+    tells_apart = np.all(stays, axis=0) & (np.ptp(starts, axis=0) > 0.0)
+    doubtful = np.all(rises, axis=0) | tells_apart
     likely = [
         taxel for taxel, is_odd in zip(taxels, doubtful, strict=True) if not is_odd
     ]

@@ -37,8 +37,8 @@ from scipy.spatial.distance import cdist
 
 from edge.arrays import Booleans, Floats, Integers
 from edge.features.names import feature
-from train.data.folds import representative
 from train.data.vectors import MOST_ROWS, Strings, Vectors, blocks
+from train.model.prototypes import clusters
 from train.threads import in_processes, single_thread
 
 UNUSUAL_RATE = 0.01
@@ -88,8 +88,8 @@ class NoveltyPoint:
         whitening: (components, components) whole numbers; a coordinate is the sum of
             products divided by 2^`shift`.
         shift: power of two.
-        rows: (n, components) whole coordinates of the training trials, or of as many of
-            each label as its share is.
+        rows: (n, components) whole coordinates of the training trials, or of the centres
+            of clusters of many.
         weights: (components,) of coordinates in remoteness: 1 for discriminants, and
             `BESIDE`.
         nearness, weighted_nearness: (n,) by which squared distances to the rows are
@@ -155,7 +155,6 @@ class NoveltySpace:
             trials: (n,) mask of those that it is the space of.
         """
         labels = labels[trials]
-        compared = representative({"": labels}, MOST_ROWS)
         scales = [_scale(x[trials], widths, least) for x in X]
         # A decision point at a time, as all together take much memory.
         steps = partial(map, lambda x, scale: _steps(x[trials], *scale), X, scales)
@@ -167,9 +166,14 @@ class NoveltySpace:
         shift = _shift(axes, STORED_BITS)
         weights = np.rint(np.ldexp(axes, shift))
         points = []
+        z = _product(_steps(X[-1][trials], *scales[-1]), weights, shift)
+        of_trials = np.arange(len(z))
+        if len(z) > MOST_ROWS:
+            count = max(MOST_ROWS // len(np.unique(labels)), 1)
+            of_trials = clusters(z, labels, count)
         for scale, of_point in zip(scales, steps(), strict=True):
             z = _product(of_point, weights, shift)
-            points.append(_point(*scale, z, labels, compared))
+            points.append(_point(*scale, z, labels, of_trials))
         return cls(weights, shift, tuple(points))
 
     def scores(self, X: Floats) -> Scores:
@@ -289,10 +293,10 @@ def _coordinates(z: Floats, whitening: Floats, shift: int) -> Floats:
 
 
 def _point(
-    mean: Floats, gain: Floats, z: Floats, labels: Strings, compared: Integers
+    mean: Floats, gain: Floats, z: Floats, labels: Strings, of_trials: Integers
 ) -> NoveltyPoint:
-    """The constants of a decision point at which trials have the components z, of which
-    some are compared with others."""
+    """The constants of a decision point at which trials have the components z, and are
+    of these clusters (n,)."""
     names, classes = np.unique(labels, return_inverse=True)
     means = np.stack([z[classes == i].mean(axis=0) for i in range(len(names))])
     within = z - means[classes]
@@ -309,10 +313,14 @@ def _point(
     fine = _shift(whitening, WHITENING_BITS)
     integers = np.rint(np.ldexp(whitening, fine))
     shift = fine - _shift(z @ whitening, STORED_BITS - 1)
-    rows = _coordinates(z[compared], integers, shift)
-    labels = labels[compared]
-    nearness = _nearness(rows, labels)
-    weighted = _nearness(rows * weights, labels)
+    y = _coordinates(z, integers, shift)
+    sizes = np.bincount(of_trials)
+    sums = [np.bincount(of_trials, column) for column in y.T]
+    rows = np.rint(np.stack(sums, axis=1) / sizes[:, None])
+    labels = labels[np.unique(of_trials, return_index=True)[1]]
+    nearness = _nearness(_alone(y, rows, of_trials, labels), labels)
+    alone = _alone(y * weights, rows * weights, of_trials, labels)
+    weighted = _nearness(alone, labels)
     return NoveltyPoint(mean, gain, integers, shift, rows, weights, nearness, weighted)
 
 
@@ -323,20 +331,29 @@ def _turned(whitening: Floats, between: Floats) -> tuple[Floats, int]:
     return whitening @ axes.T, min(len(between) - 1, len(axes))
 
 
-def _nearness(rows: Floats, labels: Strings) -> Floats:
-    """(n,) one over the squared spacing of each row: half its distance to the nearest
-    row of its label, and half the mean of these in its label."""
+def _alone(y: Floats, rows: Floats, of_trials: Integers, labels: Strings) -> Floats:
+    """(n,) the distance of each row to the nearest one of its label, or the mean distance
+    of the trials y whose centre it is; infinite without any."""
+    if len(rows) < len(y):
+        away = np.sqrt(((y - rows[of_trials]) ** 2).sum(axis=1))
+        means = np.bincount(of_trials, away) / np.bincount(of_trials)
+        return np.where(means > 0.0, means, np.inf)
     alone = np.full(len(rows), np.inf)
-    names, classes = np.unique(labels, return_inverse=True)
-    for label in range(len(names)):
-        members = np.flatnonzero(classes == label)
-        for block in blocks(members, len(members)):
-            distances = cdist(rows[block], rows[members])
-            distances[members == block[:, None]] = np.inf
-            alone[block] = distances.min(axis=1)
+    for label in np.unique(labels):
+        members = np.flatnonzero(labels == label)
+        distances = cdist(rows[members], rows[members])
+        np.fill_diagonal(distances, np.inf)
+        alone[members] = distances.min(axis=1)
+    return alone
+
+
+def _nearness(alone: Floats, labels: Strings) -> Floats:
+    """(n,) one over the squared spacing of each row: half of how far it is `_alone`, and
+    half the mean of this in its label."""
+    classes = np.unique(labels, return_inverse=True)[1]
     has_others = np.isfinite(alone)
     usual = float(alone[has_others].mean()) if has_others.any() else 1.0
-    alone[~has_others] = usual
+    alone = np.where(has_others, alone, usual)
     of_label = np.bincount(classes, alone) / np.bincount(classes)
     spacing = np.maximum(0.5 * (alone + of_label[classes]), 1.0)
     return _in_float32(spacing**-2.0)

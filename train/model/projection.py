@@ -14,8 +14,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from sklearn.base import BaseEstimator, TransformerMixin
-from sklearn.utils.validation import check_is_fitted
 
 from edge.arrays import Booleans, Floats, Integers
 from edge.errors import InputError
@@ -330,7 +328,8 @@ class Grid:
         return np.asarray(np.clip(units, -self.limit, self.limit) * self.unit)
 
 
-class Projection(TransformerMixin, BaseEstimator):
+@dataclass(eq=False)
+class Projection:
     """A few whole-number coordinates of feature vectors, the same bits on every
     machine.
 
@@ -361,21 +360,12 @@ class Projection(TransformerMixin, BaseEstimator):
             to c; 1 for `lda`.
     """
 
-    def __init__(
-        self,
-        scaling: str = "none",
-        components: int = 20,
-        features: Sequence[str] = FEATURES,
-        kind: str = "pca",
-        shrinkage: float = 0.01,
-        widths: Sequence[int] | None = None,
-    ) -> None:
-        self.scaling = scaling
-        self.components = components
-        self.features = features
-        self.kind = kind
-        self.shrinkage = shrinkage
-        self.widths = widths
+    scaling: str = "none"
+    components: int = 20
+    features: Sequence[str] = FEATURES
+    kind: str = "pca"
+    shrinkage: float = 0.01
+    widths: Sequence[int] | None = None
 
     def fit(self, X: Floats, y: NDArray[Any] | None = None) -> Projection:
         """Fit to X (n, p) and, if `kind` is `lda`, to the labels y (n,) or (n, tasks).
@@ -387,7 +377,6 @@ class Projection(TransformerMixin, BaseEstimator):
                 is unknown, or `lda` has no labels or a shrinkage that is not above 0.
         """
         X = np.asarray(X, dtype=np.float64)
-        self.n_features_in_ = X.shape[1]
         self.mean_, self.gain_, d = centred_and_scaled(
             X,
             self.scaling,
@@ -424,6 +413,5 @@ class Projection(TransformerMixin, BaseEstimator):
 
     def transform(self, X: Floats) -> Floats:
         """Coordinates (n, c), multiples of `grid_.unit`, of vectors (n, p)."""
-        check_is_fitted(self)
         d = (np.asarray(X, dtype=np.float64) - self.mean_) * self.gain_
         return self.grid_.project(d, self.weights_)

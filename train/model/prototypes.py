@@ -15,7 +15,7 @@ from threadpoolctl import threadpool_limits
 
 from edge.arrays import Booleans, Floats, Integers
 from train.data.folds import SEED, finest, label_sets
-from train.data.vectors import MOST_ROWS, Labels, Vectors
+from train.data.vectors import MOST_ROWS, Labels, Strings, Vectors
 from train.model.pipeline import Choices, Fits, fit_together
 
 
@@ -57,15 +57,20 @@ def divided(
             fitted |= fit_together(choice, at_point)
         spaces.append(fitted[task].space.project(at_point.X))
     coordinates = np.hstack(spaces)
-    sets = label_sets(at_point.y)
-    prototypes = np.empty(len(sets), dtype=np.int64)
+    return clusters(coordinates, label_sets(at_point.y), count)
+
+
+def clusters(coordinates: Floats, labels: Strings, count: int) -> Integers:
+    """(n,) the cluster of each row of coordinates (n, c), by its number; each label has
+    at most so many, which follow one another."""
+    numbers = np.empty(len(labels), dtype=np.int64)
     first = 0
-    for labels in np.unique(sets):
-        members = np.flatnonzero(sets == labels)
+    for label in np.unique(labels):
+        members = np.flatnonzero(labels == label)
         places = _parts(coordinates[members], count)
-        prototypes[members] = first + places
+        numbers[members] = first + places
         first += int(places.max()) + 1
-    return prototypes
+    return numbers
 
 
 def _parts(rows: Floats, count: int) -> Integers:

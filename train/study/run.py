@@ -16,7 +16,7 @@ from train.simulate import scene as scenes
 from train.simulate.run import write as simulate
 from train.simulate.scene_model import Scene
 from train.study import paper, sweeps
-from train.study.context import Context
+from train.study.sweeps import Context
 
 TABLES = {"resolution": "I", "scaling": "II", "features": "III"}
 """{our table: the paper's table of the same settings}."""
@@ -119,8 +119,8 @@ def _analysed(context: Context, seeds: int) -> list[Section]:
 
 
 def _lead(context: Context, constant: Sequence[str]) -> list[str]:
-    """The paragraphs below the title: the data set, and the labels and recordings left
-    out."""
+    """The paragraphs below the title: the data set, and the labels and recordings that
+    are ignored."""
     dataset = context.dataset
     scene = context.scene
     layout = dataset.layout
@@ -140,11 +140,11 @@ def _lead(context: Context, constant: Sequence[str]) -> list[str]:
     ]
     if constant:
         lead.append(
-            f"Left out, because every trial has the same label: {', '.join(constant)}."
+            f"Ignored, because every trial has the same label: {', '.join(constant)}."
         )
     if dataset.untouched:
         lead.append(
-            f"Left out: {counted(len(dataset.untouched), 'recording')} without a "
+            f"Ignored: {counted(len(dataset.untouched), 'recording')} without a "
             "contact."
         )
     return lead

@@ -1,21 +1,51 @@
 """The paper's own analyses of the features: its Tables I to III."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from itertools import combinations
 from typing import Any
 
-from edge.features.vector import FEATURES
+from edge.arrays import Floats
+from edge.features.vector import FEATURES, SAMPLES, WINDOW_S
 from edge.record.recording import Recording
 from edge.touch.arm import Chain
 from edge.touch.layout import SkinLayout
 from train.choose.evaluate import Result
+from train.data.dataset import DataSet
 from train.data.vectors import Labels
 from train.model.scaling import OF_PAPER
 from train.report.score import grid_search, score
 from train.report.section import Row, Section, Table
 from train.report.skins import coarser, follow, vectors
-from train.study.context import Context
+from train.report.work import Workers
+from train.simulate.scene_model import Scene
 from train.study.paper import papers
+
+
+@dataclass(frozen=True)
+class Context:
+    """A data set and the processes to work with.
+
+    Attributes:
+        dataset: contacts followed for up to 2 s.
+        scene: the scene that the recordings were simulated from, if any.
+        workers: the processes.
+    """
+
+    dataset: DataSet
+    scene: Scene | None = None
+    workers: Workers = field(default_factory=Workers)
+
+    @property
+    def labels(self) -> Labels:
+        """{task: (n,) labels} of the tasks that have more than one class."""
+        y = {task: self.dataset.labels(task) for task in self.dataset.tasks}
+        return {task: labels for task, labels in y.items() if len(set(labels)) > 1}
+
+    def vectors(self, names: Sequence[str] = FEATURES) -> Floats:
+        """The trials' feature vectors."""
+        return self.dataset.features(WINDOW_S, SAMPLES, names)
+
 
 SUBSETS = tuple(names for size in (1, 2, 3) for names in combinations(FEATURES, size))
 

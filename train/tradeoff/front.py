@@ -5,10 +5,11 @@ from __future__ import annotations
 
 import math
 from contextlib import suppress
-from dataclasses import asdict, dataclass, fields
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
+from edge.config import ConfigTable
 from edge.errors import InputError
 from train.json_files import json_file
 from train.tradeoff.choices import Points
@@ -16,6 +17,7 @@ from train.tradeoff.choices import Points
 NAMES = ("fast", "balanced", "accurate")
 BALANCED_S = 0.9
 """The longest window that counts as balanced."""
+SHARE = {"low": 0.0, "high": 1.0}
 
 
 @dataclass(frozen=True)
@@ -28,17 +30,10 @@ class OperatingPoint:
         low, high: 95 % interval of the exported model's accuracy.
     """
 
-    window_s: float
-    accuracy: float
-    low: float
-    high: float
-
-    def check(self) -> None:
-        """Raise ValueError for a time or a share that no decision has."""
-        shares = (self.accuracy, self.low, self.high)
-        possible = all(0.0 <= share <= 1.0 for share in shares)
-        if not (possible and 0.0 < self.window_s <= 60.0):
-            raise ValueError("a point of an impossible time or accuracy")
+    window_s: float = field(metadata={"low": 0.0, "high": 60.0, "open_low": True})
+    accuracy: float = field(metadata=SHARE)
+    low: float = field(metadata=SHARE)
+    high: float = field(metadata=SHARE)
 
 
 @dataclass(frozen=True)
@@ -102,22 +97,17 @@ class ParetoFront:
         """
         remedy = "make one with `make tradeoff`"
         with json_file(path, "a front.json", remedy) as content:
-            points = [
-                OperatingPoint(
-                    *(float(point[key.name]) for key in fields(OperatingPoint))
-                )
-                for point in content["points"]
-            ]
-            task = str(content["task"])
-            measured = str(content["data_digest"])
-            quick = bool(content["quick"])
-            if not points:
-                raise ValueError("no point")
-            for point in points:
-                point.check()
-        if measured != digest:
+            table = ConfigTable(content, str(path))
+        points = [
+            OperatingPoint(**point.values(OperatingPoint))
+            for point in table.tables("points", "point")
+        ]
+        task = table.text("task")
+        of_points = table.text("data_digest")
+        quick = table.flag("quick")
+        if of_points != digest:
             raise InputError(
-                f"{path}: was measured on other recordings (digest {measured[:12]}, "
+                f"{path}: was measured on other recordings (digest {of_points[:12]}, "
                 f"these have {digest[:12]}); {remedy} DATA=... of these"
             )
         fastest_first = sorted(points, key=lambda point: point.window_s)

@@ -2,7 +2,6 @@
 
 from dataclasses import replace
 from itertools import product
-from unittest.mock import Mock
 
 import numpy as np
 import pytest
@@ -14,7 +13,6 @@ from train.choose.evaluate import (
     NestedAccuracy,
     Result,
     evaluate,
-    fits,
 )
 from train.choose.protocols import Protocol
 from train.choose.rule import MOST_ACCURATE, Rule
@@ -215,11 +213,3 @@ def test_what_cannot_be_parted_or_measured_is_one_sentence():
     vectors.X[5, 3] = np.nan
     with pytest.raises(InputError, match="trial 5 are not finite"):
         evaluate(vectors, stratified_folds(y, 3), GRIDS)
-
-
-def test_progress_is_told_after_each_of_the_fits_that_are_announced():
-    vectors = trials()
-    folds = stratified_folds(vectors.y["t"], 5)
-    progress = Mock()
-    evaluate(vectors, folds, GRIDS[:1], progress=progress)
-    assert progress.call_count == fits(folds, True) == 15

@@ -8,6 +8,7 @@ import pytest
 from tests.checks.hard_cases import exact
 from train.data.folds import stratified_folds
 from train.data.vectors import Vectors
+from train.model import novelty
 from train.model.novelty import (
     CLIP,
     FARTHEST,
@@ -192,3 +193,18 @@ def test_few_trials_have_few_components():
     assert NoveltySpace.of(X, labels, WIDTHS).weights.shape == (30, 4)
     X, labels = trials(400)
     assert NoveltySpace.of(X, labels, WIDTHS).weights.shape[1] <= MOST_COMPONENTS
+
+
+def test_of_many_trials_the_centres_of_clusters_are_compared(monkeypatch):
+    monkeypatch.setattr(novelty, "MOST_ROWS", 20)
+    X, labels = trials(200)
+    space = NoveltySpace.of(X, labels, WIDTHS)
+    new, _ = trials(40, seed=5)
+    for point, of_known, of_far in zip(
+        space.points,
+        space.scores(new).remoteness,
+        space.scores(3.0 * new).remoteness,
+        strict=True,
+    ):
+        assert len(point.rows) == 20
+        assert np.median(of_far) > 2.0 * np.median(of_known)

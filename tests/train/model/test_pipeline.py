@@ -1,12 +1,7 @@
-"""Votes, neighbours and all tasks of a model, against the rules and scikit-learn's own
-tools."""
+"""Votes, neighbours and all tasks of a model, against the rules."""
 
 import numpy as np
 import pytest
-from sklearn.base import clone
-from sklearn.model_selection import cross_val_score
-from sklearn.neighbors import KNeighborsClassifier
-from sklearn.pipeline import make_pipeline
 
 from edge.errors import InputError
 from tests.checks.hard_cases.models import features
@@ -17,7 +12,6 @@ from train.model.pipeline import (
     slope,
     vote,
 )
-from train.model.projection import Projection
 
 
 def test_votes_and_ties():
@@ -29,17 +23,6 @@ def test_votes_and_ties():
 def test_a_twentieth_of_a_labels_trials_stand_for_it_but_three_if_there_are():
     sizes = np.array([0, 2, 3, 59, 61, 100])
     assert nearest_of_label(sizes).tolist() == [0, 2, 3, 3, 4, 5]
-
-
-def test_the_projection_works_in_a_scikit_learn_pipeline():
-    X = features(30)
-    y = np.repeat(["a", "b"], 15)
-    for kind in ("pca", "lda"):
-        pipe = make_pipeline(Projection("IV", 3, kind=kind), KNeighborsClassifier(1))
-        assert (pipe.fit(X, y).predict(X) == y).all()
-        assert cross_val_score(pipe, X, y, cv=5).shape == (5,)
-        copy = clone(pipe).fit(X, y)
-        assert (copy[0].weights_ == pipe[0].weights_).all()
 
 
 def test_the_slope_makes_a_share_of_right_answers_their_log_odds():

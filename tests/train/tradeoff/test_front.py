@@ -70,9 +70,9 @@ def test_a_wish_that_no_point_fulfils_is_one_sentence(front, wish, message):
     ("content", "message"),
     [
         ("{", "not a front.json"),
-        (text(points=[]), "not a front.json"),
-        (text().replace('"window_s": 0.1', '"window_s": -1'), "not a front"),
-        (text(points=[(100, 60)]), "not a front.json"),
+        (text(points=[]), "points must be a list of tables"),
+        (text().replace('"window_s": 0.1', '"window_s": -1'), "window_s must be a"),
+        (text(points=[(100, 60)]), "accuracy must be a number from 0 to 1, not 60"),
         (text(data_digest="1" * 64), "was measured on other recordings"),
     ],
 )
