@@ -28,7 +28,7 @@ from train.progress import bar
 
 PACKAGES = ("edge", "train", "export", "tests")
 MOST_UNNOTICED = 1 / 50
-LONGEST_S = 900.0
+LONGEST_S = 300.0
 """A loop without an end is noticed."""
 EXCHANGED = [
     ("<", "<="),

@@ -75,6 +75,19 @@ def test_a_call_that_the_kernel_completes_in_part_is_no_reading(library, tmp_pat
     ), process.stderr
 
 
+def test_a_single_message_that_nobody_takes_is_an_error_with_its_address(library):
+    process = run(
+        library,
+        """
+        from edge.wire.bus.linux import LinuxBus
+        from edge.wire.bus.protocol import write
+        bus = LinuxBus("/dev/i2c-1")
+        bus.transfer(bus.prepare(write(0x11, [0])))
+        """,
+    )
+    assert "BusNack: /dev/i2c-1, address 0x11" in process.stderr
+
+
 def test_a_bus_that_another_program_uses_is_refused(library):
     opening = "from edge.wire.bus.linux import LinuxBus; LinuxBus('/dev/i2c-1')"
     process = run(library, opening, I2CDEV_LOCKED="1")
