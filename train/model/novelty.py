@@ -64,6 +64,8 @@ MOVED_SHARE = 0.05
 scene drew the trained things, as a share of its feature's largest."""
 REMOUNT_RAD = math.radians(2.0)
 """By so much a joint's zero lies off once an arm was taken off and put on again."""
+MOST_CENTRES = 250
+"""Centres of clusters; more would make a file of eleven decision points exceed 2 MB."""
 CLIP = 6.0
 """Standard deviations at which a column is cut off."""
 STEP_BITS = 12
@@ -169,7 +171,7 @@ class NoveltySpace:
         z = _product(_steps(X[-1][trials], *scales[-1]), weights, shift)
         of_trials = np.arange(len(z))
         if len(z) > MOST_ROWS:
-            count = max(MOST_ROWS // len(np.unique(labels)), 1)
+            count = max(MOST_CENTRES // len(np.unique(labels)), 1)
             of_trials = clusters(z, labels, count)
         for scale, of_point in zip(scales, steps(), strict=True):
             z = _product(of_point, weights, shift)

@@ -197,6 +197,7 @@ def test_few_trials_have_few_components():
 
 def test_of_many_trials_the_centres_of_clusters_are_compared(monkeypatch):
     monkeypatch.setattr(novelty, "MOST_ROWS", 20)
+    monkeypatch.setattr(novelty, "MOST_CENTRES", 20)
     X, labels = trials(200)
     space = NoveltySpace.of(X, labels, WIDTHS)
     new, _ = trials(40, seed=5)
