@@ -260,16 +260,8 @@ class Source:
             roots = {"log", "sqrt"}.intersection(feature.transforms)
             if not feature.quantity.kernels:
                 self._add_work("root", samples * count * len(roots))
-            kinds = [TRANSFORMS.index(kind) for kind in feature.transforms]
-            made = record(
-                "ec_feature",
-                floor=feature.quantity.floor(self._layout),
-                course=[*courses].index(course) if course in courses else 0,
-                quantity=codes().index(feature.quantity.code),
-                transforms=[*kinds, 0, 0, 0][:3],
-                summary=SUMMARIES.index(feature.summary),
-            )
-            features.append(made)
+            number = [*courses].index(course) if course in courses else 0
+            features.append(_feature(feature, self._layout, number))
         names = ("samples", "rows", "zone", "quantity")
         self._tables["features"] = features
         self._tables["courses"] = [
@@ -369,29 +361,7 @@ class Source:
         """The tasks, their labels and their calibration."""
         tasks = self._info.tasks
         names = list(tasks)
-        rows = []
-        for name, task in tasks.items():
-            rule = rules.get(name)
-            indices = [self._pools.add("words", of) for of in task.factors.values()]
-            stopping = self._info.stopping.get(name)
-            factors = [names.index(factor) for factor in task.factors]
-            made = record(
-                "ec_task",
-                text=self._pools.text(name, *task.labels),
-                indices=indices or NOWHERE,
-                factors=factors or 0,
-                labels=len(task.labels),
-                k=task.k,
-                **self._formula.task(name),
-            )
-            if stopping is not None:
-                made["rule_curve"] = stopping.slope, stopping.intercept, stopping.doubt
-            if rule:
-                made["rule_confidence"] = rule.confidence
-                made["rule_last"] = rule.last
-                made["has_rule"] = True
-            rows.append(made)
-        self._tables["tasks"] = rows
+        self._tables["tasks"] = [self._task(name, rules.get(name)) for name in tasks]
         # Of a space the rows with most components come first: others are parts of them.
         wide = sorted(tasks, key=lambda name: -tasks[name].components)
         places = {
@@ -407,6 +377,30 @@ class Source:
             "neighbours": max(task.k for task in tasks.values()),
             "nearest": self._formula.nearest,
         }
+
+    def _task(self, name: str, rule: StoppingRule | None) -> Array:
+        """The `ec_task` of a task, with its rule for early decisions, if any."""
+        task = self._info.tasks[name]
+        names = list(self._info.tasks)
+        indices = [self._pools.add("words", of) for of in task.factors.values()]
+        factors = [names.index(factor) for factor in task.factors]
+        made = record(
+            "ec_task",
+            text=self._pools.text(name, *task.labels),
+            indices=indices or NOWHERE,
+            factors=factors or 0,
+            labels=len(task.labels),
+            k=task.k,
+            **self._formula.task(name),
+        )
+        stopping = self._info.stopping.get(name)
+        if stopping is not None:
+            made["rule_curve"] = stopping.slope, stopping.intercept, stopping.doubt
+        if rule:
+            made["rule_confidence"] = rule.confidence
+            made["rule_last"] = rule.last
+            made["has_rule"] = True
+        return made
 
     def _curve(self, task: str, point: int) -> tuple[float, float, float]:
         """The curve of a task's confidence at a decision point."""
@@ -463,6 +457,19 @@ class Source:
             + (4 * size["spaces"] + 12) * size["components"]
             + REST_OF_RAM
         )
+
+
+def _feature(feature: Feature, layout: SkinLayout, course: int) -> Array:
+    """The `ec_feature` of a feature that is made of a course."""
+    kinds = [TRANSFORMS.index(kind) for kind in feature.transforms]
+    return record(
+        "ec_feature",
+        floor=feature.quantity.floor(layout),
+        course=course,
+        quantity=codes().index(feature.quantity.code),
+        transforms=[*kinds, 0, 0, 0][:3],
+        summary=SUMMARIES.index(feature.summary),
+    )
 
 
 def digests(header: Sequence[int]) -> str:

@@ -79,12 +79,7 @@ def _draw(
     horizon = WINDOW_S if model is None else model.info.window_s
     touches = [_Column.of(*recording, horizon) for recording in recordings]
     layout = touches[0].recording.layout
-    for touch in touches:
-        if units(touch.recording.layout) != units(layout):
-            raise InputError(
-                f"{touch.name}: has other units than the first recording; draw "
-                "recordings of one skin"
-            )
+    _require_units(touches, units(layout))
     figure = Figure(figsize=(2.6 * len(touches) + 0.6, 8.6), layout="constrained")
     axes = figure.subplots(
         4,
@@ -213,3 +208,13 @@ def _draw_answer(axis: Any, decided: Decided) -> None:
         color="C1",
         weight="bold",
     )
+
+
+def _require_units(touches: Sequence[_Column], of_first: tuple[str, str, str]) -> None:
+    """Refuse touches of several skins."""
+    for touch in touches:
+        if units(touch.recording.layout) != of_first:
+            raise InputError(
+                f"{touch.name}: has other units than the first recording; draw "
+                "recordings of one skin"
+            )

@@ -216,7 +216,7 @@ class ModelInfo:
     """`world` (with joint angles) or `skin`."""
     chain: Chain | None
     rows: int
-    """Training trials."""
+    """Training trials, or prototypes of many, to which distances are measured."""
     data_digest: str = field(metadata={"empty": True})
     versions: dict[str, str] = field(default_factory=dict)
     decision_points_s: tuple[float, ...] = ()
@@ -233,8 +233,8 @@ class ModelInfo:
     name: str = limited("", empty=True)
     """The model's name."""
     trials: tuple[str, ...] = ()
-    """(rows,) names of the training trials; empty where they were too many to be
-    kept."""
+    """(rows,) names of the training trials, or of those next to the prototypes; empty
+    where they were too many to be kept."""
     usual: Mapping[str, Sequence[float]] = field(default_factory=dict)
     """{feature: the least and the greatest mean over the full window of nearly all
     training trials}; empty without decision points."""

@@ -120,7 +120,7 @@ def answer(at: Constants, task: str, z: Floats, off: Floats) -> dict[str, Array]
     k = at.numbers(f"k of {task}", 1).item()
     neighbours = squares.argsort(axis=1, kind="stable")[:, :k]
     nearest = np.sqrt(np.take_along_axis(squares, neighbours, axis=1))
-    # What is not finite has no label.
+    # A vector that is not finite has no label.
     voters = np.where(off[:, None] <= LARGEST, labels[neighbours], -1)
     label, shares = vote(voters, classes)
     outputs = {

@@ -117,6 +117,7 @@ class Model:
         onnx_file.check(self.contents, name)
         self._scorer = open_engine(name, self.contents, self.info, engine)
         self.engine = self._scorer.name
+        self._expected = self.info.outputs
         # A graph that is not that of its metadata is refused at once.
         self.run(np.zeros((1, self.info.width)))
 
@@ -169,11 +170,11 @@ class Model:
             )
         try:
             scored = self._scorer.score(vectors, point)
-            outputs = {name: scored[name] for name in self.info.outputs}
+            outputs = {name: scored[name] for name in self._expected}
         # An index past its tensor, shapes that do not match, or a constant that lacks.
         except Exception as error:
             raise self._broken(printable(f"{type(error).__name__}: {error}")) from None
-        for name, (kind, shape) in self.info.outputs.items():
+        for name, (kind, shape) in self._expected.items():
             value = outputs[name]
             if value.dtype != kind or value.shape != (len(vectors), *shape):
                 raise self._broken(f"{name} is {value.dtype} {value.shape}")

@@ -119,7 +119,7 @@ def feature_vector(
         raise InputError("the contact has no frame")
     zones = cache(partial(ZoneSeries, series))
     course = _Course(series, window_s, tables or {}, zones)
-    # What is too large for a float is refused by the model.
+    # The model refuses a value that is too large for a float.
     with np.errstate(all="ignore"):
         groups = [tuple(group) for _, group in groupby(types, key=_kind)]
         return np.concatenate([course.block(group, samples) for group in groups])

@@ -1,1 +1,1 @@
-"""What is kept of touches: recordings, and the table of their labels."""
+"""Recordings of touches, and the table of their labels."""

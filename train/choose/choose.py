@@ -34,7 +34,7 @@ class Choosing:
     Args:
         dataset: measured for every candidate.
         y: {task: (n,) labels}.
-        candidates: what is tried.
+        candidates: settings to try.
         divisions: the trials that are held out together.
         samples: values of a feature.
         jobs: processes.

@@ -52,7 +52,7 @@ def option(default: Any, text: str, flags: str | None = "", **how: Any) -> Any:
 
 @dataclass(frozen=True, kw_only=True)
 class FitOptions:
-    """What a fit holds fixed; it chooses what is None."""
+    """Settings that a fit holds fixed; it chooses those that are None."""
 
     tasks: Sequence[str] | None = option(
         None,

@@ -1,5 +1,5 @@
-"""What is held out to choose a task's settings and to measure them: single trials, or
-entire groups of them."""
+"""The trials that are held out to choose a task's settings and to measure them, singly or
+in entire groups."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -69,7 +69,7 @@ class Protocol:
 
     @property
     def name(self) -> str:
-        """What is held out."""
+        """The groups that are held out."""
         return TRIAL if self.groups is None else self.groups.name
 
     @property

@@ -387,7 +387,7 @@ def load_trials(
 
     Args:
         data: recordings, or `.npz` files and folders of them.
-        measurement: what is measured.
+        measurement: of each contact.
         partial: keep trials that have a label for some task.
         progress: show progress bars on stderr.
         jobs: processes.

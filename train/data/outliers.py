@@ -21,7 +21,7 @@ share of the usual one. Any touch that differs then lies far outside."""
 UNLIMITED = (-np.inf, np.inf)
 LEAVE_OUT = "leave the recording out if it is wrong"
 FEWEST_TRIALS = 10
-"""Fewer others do not tell what is usual."""
+"""Fewer others do not tell usual values."""
 
 
 def deviations(values: Floats) -> Floats:

@@ -44,7 +44,7 @@ class Trial(NamedTuple):
 
 @dataclass(frozen=True)
 class Refused:
-    """What is left out: a sentence that names it and says why."""
+    """Files that are left out: a sentence names each and says why."""
 
     sentence: str
 

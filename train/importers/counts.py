@@ -136,7 +136,7 @@ class Rest:
 
     @property
     def base(self) -> NDArray[np.float64] | float:
-        """What is subtracted from values."""
+        """Counts that are subtracted from values."""
         return 0.0 if self.values is None else self.values
 
     def recording(

@@ -56,7 +56,7 @@ table = pandas.read_csv("cup_1.csv")  # sep=";", decimal=",", thousands="."
 frames = table[["s1", "s2"]].round().astype(int).to_numpy()  # from 0 to 65535
 meta = {"skin": {"rows": 1, "cols": frames.shape[1]}, "labels": {"object": "cup"}}
 edge.save("cup_1.npz", edge.Recording(table["t"].to_numpy(), frames, meta=meta))"""
-"""What is printed where no table is clear."""
+"""Lines to print where no table is clear."""
 add_options = add_table_options
 
 
@@ -280,7 +280,7 @@ def _recorded(
     if trials[0].meaning.are_all:
         _require_taxels(samples, trials[0].meaning.taxels)
     shape = _announced(trials, skin, labels, options)
-    # What is cut at contact has no rest.
+    # A recording that is cut at contact has no rest.
     counts = options.counts or options.onset is not None
     rest = rest_of(samples, replace(options, counts=counts))
     common = {"skin": skin.raw, "source": path.name}

@@ -229,20 +229,23 @@ def _by_name(places: Sequence[Place], task: str) -> Labels:
     """The labels that the names of files and folders tell."""
     counting = _counting([place.path for place in places])
     are_ids = all(LABEL_AND_ID.fullmatch(place.stem) for place in places)
-    of = []
-    sources = []
-    for place in places:
-        source = "the folder's name"
-        names = [part for part in place.path.parts[:-1] if part not in counting]
-        if not names and are_ids:
-            source = "the file's name before the first dot"
-            names = [place.stem.partition(".")[0]]
-        elif not names:
-            source = "the file's name without the number at its end"
-            names = [re.sub(COUNT, "", place.stem)]
-        of.append({task: names[-1]} if names[-1] else {})
-        sources.append(f'{source}, such as "{names[-1]}"' if names[-1] else NONE)
-    return Labels(of, sources[0])
+    named = [_name(place, counting, are_ids) for place in places]
+    name, source = named[0]
+    of = [{task: label} if label else {} for label, _ in named]
+    return Labels(of, f'{source}, such as "{name}"' if name else NONE)
+
+
+def _name(place: Place, counting: set[str], has_id: bool) -> tuple[str, str]:
+    """The label that a name tells, or an empty one, and which part of the name that
+    is."""
+    folders = [part for part in place.path.parts[:-1] if part not in counting]
+    if folders:
+        return folders[-1], "the folder's name"
+    if has_id:
+        return place.stem.partition(".")[0], "the file's name before the first dot"
+    return re.sub(
+        COUNT, "", place.stem
+    ), "the file's name without the number at its end"
 
 
 def _counting(paths: Sequence[Path]) -> set[str]:

@@ -180,7 +180,7 @@ class Log:
         return rest_of([samples], self.options).recording(samples, shape, meta)
 
     def _table_of_frames(self) -> tuple[str, pd.DataFrame]:
-        """The topic of the frames, and its table; says what is left out."""
+        """The topic of the frames, and its table; names the topics that are left out."""
         name = self._topic("frames", self._frames)
         if name is None:
             raise InputError(f"{self.path}: holds no frames{self._why_empty()}")

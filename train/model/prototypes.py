@@ -1,8 +1,8 @@
 """Prototypes: the few rows of a model that many trials make.
 
 The trials of a set of labels are divided by k-means among the discriminants of the task
-that has most labels, at the full window and half-way to it: what is alike in the end may
-differ before. In every space and at every decision point a prototype lies at the mean of
+that has most labels, at the full window and half-way to it: trials that are alike in the end
+may differ before. In every space and at every decision point a prototype lies at the mean of
 its trials, so that its trials are near everywhere.
 """
 

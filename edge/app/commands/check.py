@@ -90,7 +90,12 @@ def remarks(file: SkinFile) -> Iterator[str]:
             )
     if file.calibration is None:
         yield f"not calibrated yet: run `edge-classify calibrate --skin {file.path}`"
-        return
+    else:
+        yield from _remarks_on_noise(file)
+
+
+def _remarks_on_noise(file: SkinFile) -> Iterator[str]:
+    """Chips of a calibrated skin that could freeze and be noticed late, or never."""
     limits = stuck_limits(file)
     hidden = int((limits == NEVER_STUCK).sum())
     if hidden:

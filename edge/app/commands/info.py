@@ -90,7 +90,7 @@ def _origin(info: ModelInfo) -> list[str]:
         sentences.append(f"Arm: {info.chain.base} to {info.chain.tip}, joints {names}.")
     versions = ", ".join(f"{name} {version}" for name, version in info.versions.items())
     sentences.append(
-        f"Compares with {info.rows} trials, data digest {info.data_digest[:16]}, with "
-        f"{versions}."
+        f"Compares with {info.rows} trials or prototypes, data digest "
+        f"{info.data_digest[:16]}, with {versions}."
     )
     return sentences

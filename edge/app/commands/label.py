@@ -174,11 +174,13 @@ def _undo(data: Sequence[str], output: Output) -> int:
     last = list(filter(None, map(former, places)))
     if not last:
         raise InputError(f"{', '.join(data)}: there is no change to take back")
-    latest = max(it.time for it in last)
-    for it in last:
-        if it.time == latest:
-            folder = undo(it)
-            output.text(f"{folder}: is as before `{it.command}` of {latest[:19]} UTC")
+    latest = max(table.time for table in last)
+    for table in last:
+        if table.time == latest:
+            folder = undo(table)
+            output.text(
+                f"{folder}: is as before `{table.command}` of {latest[:19]} UTC"
+            )
     return 0
 
 

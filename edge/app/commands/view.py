@@ -22,7 +22,7 @@ import numpy as np
 
 from edge.app.options import add_file, add_reading
 from edge.app.output import Output
-from edge.app.source import reading
+from edge.app.source import Live, reading
 from edge.app.texts import event_text
 from edge.arrays import Bytes, Floats
 from edge.decide.classifier import Classifier
@@ -186,7 +186,6 @@ def run(arguments: argparse.Namespace) -> int:
                 "run` prints JSON lines"
             )
     model = None if arguments.model is None else Model(arguments.model)
-    texts: deque[str] = deque(maxlen=MOST_EVENTS)
     with (
         reading(
             arguments,
@@ -197,19 +196,25 @@ def run(arguments: argparse.Namespace) -> int:
         drawing() if live.page is None else nullcontext(),
     ):
         classifier = None if model is None else Classifier(model, live.skin.layout)
-        layout = live.skin.layout if classifier is None else classifier.layout
-        interval_s = 1.0 / RATE_HZ - 0.5 * live.skin.period_s
-        for frame, faults in live.frames():
-            events = [] if classifier is None else classifier.push(frame)
-            for sink in live.sinks:
-                sink.push(frame, [*faults, *events])
-            _follow(events, texts)
-            if frame.t >= due:
-                due = frame.t + interval_s
-                text = draw(frame, layout, texts) + "\n"
-                # Each line clears the rest of its row.
-                print(HOME + text.replace("\n", "\x1b[K\n"), end="", flush=True)
+        _watch(live, classifier, due)
     return 0
+
+
+def _watch(live: Live, classifier: Classifier | None, due: float) -> None:
+    """Push every frame into the sinks, and draw from a time on."""
+    texts: deque[str] = deque(maxlen=MOST_EVENTS)
+    layout = live.skin.layout if classifier is None else classifier.layout
+    interval_s = 1.0 / RATE_HZ - 0.5 * live.skin.period_s
+    for frame, faults in live.frames():
+        events = [] if classifier is None else classifier.push(frame)
+        for sink in live.sinks:
+            sink.push(frame, [*faults, *events])
+        _follow(events, texts)
+        if frame.t >= due:
+            due = frame.t + interval_s
+            text = draw(frame, layout, texts) + "\n"
+            # Each line clears the rest of its row.
+            print(HOME + text.replace("\n", "\x1b[K\n"), end="", flush=True)
 
 
 def _follow(events: Iterable[Event], texts: deque[str]) -> None:

@@ -308,10 +308,14 @@ class BusReader:
         if not waiting or not self._time_left() or not self._reachable():
             return
         for slot in sorted(waiting, key=lambda slot: slot.began):
-            while self._step(slot) and not slot.running and self._time_left(deadline):
-                pass
+            self._go_on(slot, deadline)
             if not self._time_left(deadline):
                 return
+
+    def _go_on(self, slot: Slot, deadline: float) -> None:
+        """Go through the steps of a chip's set-up, until the deadline."""
+        while self._step(slot) and not slot.running and self._time_left(deadline):
+            pass
 
     def _reachable(self) -> bool:
         """Whether the bus is open; one on which no chip runs is opened again.

@@ -3,7 +3,7 @@
 import io
 import math
 import zipfile
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from typing import Any, BinaryIO
 
@@ -228,10 +228,14 @@ def _frames(arrays: dict[str, NDArray[Any]], axis: int | None, time: str | None)
     shared = set.intersection(*(set(array.shape) for array in arrays.values()))
     if len(arrays) == 1:
         shared = {largest.shape[0]} & {max(largest.shape)}
-    if len(shared) == 1:
-        return int(shared.pop())
+    if len(shared) != 1:
+        raise _unclear(arrays)
+    return int(shared.pop())
+
+
+def _unclear(arrays: Mapping[str, NDArray[Any]]) -> InputError:
     sizes = {name or "the array": array.shape for name, array in arrays.items()}
-    raise InputError(
+    return InputError(
         f"which axis is the time? The arrays are {short_text(sizes)}; give --axis, or name "
         "those to be used by --taxels and --joints"
     )

@@ -1,6 +1,6 @@
 """A folder for each trial with a file for each frame, named by its time or number."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -27,11 +27,8 @@ def tables(folder: Path, options: TableOptions) -> Iterator[Table]:
         raise InputError(f"{folder}: each file is {unread.kind_of(kinds.pop())}")
     if not files:
         return
-    frames = [_frame(file) for file in files]
+    frames = _frames(files)
     shape = frames[0].shape
-    for file, frame in zip(files, frames, strict=True):
-        if frame.shape != shape:
-            raise InputError(f"{file}: is {frame.shape} taxels, and {files[0]} {shape}")
     values = np.reshape(frames, (len(files), -1))
     data = pd.DataFrame(values, columns=numbered("", values.shape[1]))
     if options.rate is None:
@@ -50,3 +47,17 @@ def _frame(path: Path) -> NDArray[np.float64]:
             return np.atleast_2d(arrays.read_arrays(file)[""]).astype(np.float64)
         table = text.table_of(str(path), file.lines)
         return table.numbers(table.names)
+
+
+def _frames(files: Sequence[Path]) -> list[NDArray[np.float64]]:
+    """The frame of each file.
+
+    Raises:
+        InputError: they have several shapes.
+    """
+    frames = [_frame(file) for file in files]
+    shape = frames[0].shape
+    for file, frame in zip(files, frames, strict=True):
+        if frame.shape != shape:
+            raise InputError(f"{file}: is {frame.shape} taxels, and {files[0]} {shape}")
+    return frames

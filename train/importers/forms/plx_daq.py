@@ -1,7 +1,7 @@
 """Logs of an Arduino for PLX-DAQ: commands, `LABEL,` with names, `DATA,` with values."""
 
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 from train.importers.forms.file import File
@@ -22,17 +22,7 @@ def is_form(file: File) -> bool:
 
 def tables(file: File, options: TableOptions) -> Iterator[Table]:
     """The values after each CLEARDATA, without columns of the computer's clock."""
-    blocks: list[list[str]] = [[]]
-    label = ""
-    for line in file.lines:
-        text = re.sub(r",AUTOSCROLL_\d+$", "", line.strip())
-        command, _, cells = text.partition(",")
-        command = command.upper()
-        if command in ("CLEARDATA", "CLEARSHEET"):
-            blocks.append([])
-        blocks[-1].append(cells if command == "DATA" else "")
-        label = cells if command == "LABEL" else label
-    filled = [block for block in blocks if any(block)]
+    label, filled = _blocks(file.lines)
     for number, block in enumerate(filled, 1):
         table = table_of(str(file.path), [label, *block])
         clocks = [
@@ -42,3 +32,19 @@ def tables(file: File, options: TableOptions) -> Iterator[Table]:
         ]
         name = f"{file.path.stem}_{number:03}" if len(filled) > 1 else ""
         yield replace(table, data=table.data.drop(columns=clocks), name=name)
+
+
+def _blocks(lines: Sequence[str]) -> tuple[str, list[list[str]]]:
+    """The last line of names, and the lines of values after each CLEARDATA; lines of
+    other commands are empty."""
+    blocks: list[list[str]] = [[]]
+    label = ""
+    for line in lines:
+        text = re.sub(r",AUTOSCROLL_\d+$", "", line.strip())
+        command, _, cells = text.partition(",")
+        command = command.upper()
+        if command in ("CLEARDATA", "CLEARSHEET"):
+            blocks.append([])
+        blocks[-1].append(cells if command == "DATA" else "")
+        label = cells if command == "LABEL" else label
+    return label, [block for block in blocks if any(block)]

@@ -79,9 +79,7 @@ def table_of(where: str, lines: Sequence[str], note: str = "") -> Table:
         notes = [note, _odd_note(lines, rows, first)]
         if not any(names):
             notes.append("no header")
-        unnamed = "column {} unnamed" if any(names) else "{}"
-        unique = [name or unnamed.format(i) for i, name in enumerate(names, 1)]
-        require_unique(unique)
+        unique = _unique(names)
         data = {line: text for line, text in rows.items() if line >= first}
         decimal = "."
         if mark != "," and any(map(COMMA.search, data.values())):
@@ -197,21 +195,37 @@ def _first(rows: Mapping[int, str], mark: str, columns: Sequence[int]) -> int:
     )
 
 
+def _unique(names: Sequence[str]) -> list[str]:
+    """A name for every column.
+
+    Raises:
+        InputError: two have the same.
+    """
+    unnamed = "column {} unnamed" if any(names) else "{}"
+    unique = [name or unnamed.format(i) for i, name in enumerate(names, 1)]
+    require_unique(unique)
+    return unique
+
+
 def _heading(
     lines: Sequence[str], rows: Mapping[int, str], first: int, mark: str
 ) -> tuple[list[str], list[str]]:
     """The names of the columns, empty without any, and their units where a row has
     them."""
-    width = len(_cells(rows[first], mark))
     above = [_cells(text, mark) for line, text in rows.items() if line < first]
     if above:
         if any(map(UNIT.fullmatch, above[-1])) and above[:-1]:
             return above[-2], [cell.strip("[]()") for cell in above[-1]]
         return above[-1], []
-    comments = [line for line in lines[:first] if line.startswith(COMMENT)]
+    return _commented(lines[:first], mark, len(_cells(rows[first], mark))), []
+
+
+def _commented(lines: Sequence[str], mark: str, width: int) -> list[str]:
+    """The names of so many columns in the last comment, empty without any."""
+    comments = [line for line in lines if line.startswith(COMMENT)]
     names = _cells(comments[-1].lstrip("#% "), mark) if comments else []
     is_head = len(names) == width and not is_number(names[0])
-    return names if is_head else [""] * width, []
+    return names if is_head else [""] * width
 
 
 def _odd_note(lines: Sequence[str], rows: Mapping[int, str], first: int) -> str:
