@@ -14,6 +14,7 @@ from edge.features.vector import WINDOW_S
 from edge.touch.layout import SkinLayout
 from train.choose.settings import Chosen
 from train.data.dataset import DataSet, Recordings
+from train.data.folds import finest, stratified_folds
 from train.data.parts import part
 from train.report.score import paired, points
 from train.report.section import Row, Section, Table
@@ -25,6 +26,10 @@ from train.tradeoff.measured import Measurements
 WAITS_S = (0.8, 0.6, 0.4)
 EVERY = (2, 4)
 """Every n-th frame is read, for each n."""
+PARTS = (2, 4)
+"""One n-th of the trials is kept, for each n."""
+FEWEST = 20
+"""Smallest number of trials for a choice."""
 Hits = Mapping[tuple[Path, int], bool]
 """{(recording, number of its contact): whether the answer is right}."""
 
@@ -38,12 +43,15 @@ class Saving:
         price: its saving.
         source: the trials, or recordings to follow again.
         options: of the choice.
+        fewer: whether trials are left out on purpose; otherwise a contact that is no
+            longer noticed counts as wrong.
     """
 
     name: str
     price: str
     source: DataSet | Recordings
     options: Mapping[str, Any] = field(default_factory=dict)
+    fewer: bool = False
 
 
 def changes(raw: Recordings, dataset: DataSet, rate_hz: float) -> list[Saving]:
@@ -64,7 +72,7 @@ def changes(raw: Recordings, dataset: DataSet, rate_hz: float) -> list[Saving]:
         taxels = dataset.layout.rows * dataset.layout.cols
         price = f"{4 * taxels} bytes a frame fewer"
         cases.append(Saving("no shear", price, without_shear(dataset)))
-    return cases
+    return [*cases, *_fewer_trials(dataset)]
 
 
 def _fewer_frames(raw: Recordings, rate_hz: float) -> Iterator[Saving]:
@@ -89,6 +97,18 @@ def without_shear(dataset: DataSet) -> DataSet:
     """The same trials without the features of shear."""
     names = [name for name in dataset.names if not feature(name).quantity.shear]
     return dataset.of(names)
+
+
+def _fewer_trials(dataset: DataSet) -> Iterator[Saving]:
+    """A part of the trials, as far as it suffices for a choice."""
+    y = {task: dataset.labels(task) for task in dataset.tasks}
+    count = len(dataset.trials)
+    for folds in PARTS:
+        sample = dataset.part(stratified_folds(y[finest(y)], folds) == 0)
+        remaining = len(sample.trials)
+        if remaining >= FEWEST:
+            price = f"{counted(count - remaining, 'recording')} fewer"
+            yield Saving(f"{remaining} of {count} trials", price, sample, fewer=True)
 
 
 def hits(dataset: DataSet, choices: Mapping[str, Chosen]) -> dict[str, Hits]:
@@ -118,11 +138,13 @@ def answered(change: Saving, like: SkinLayout) -> dict[str, Hits]:
     return hits(dataset, chosen(dataset, **change.options))
 
 
-def difference(before: Hits, after: Hits) -> tuple[float, float, float]:
+def difference(before: Hits, after: Hits, *, fewer: bool) -> tuple[float, float, float]:
     """The percentage points gained by a change on the same trials, and their 95 %
-    interval; a contact that is no longer noticed counts as wrong."""
-    are = [after.get(trial, False) for trial in before]
-    return paired(np.array(list(before.values())), np.array(are))
+    interval; see `Saving.fewer`."""
+    trials = after if fewer else before
+    were = [before[trial] for trial in trials]
+    are = [after.get(trial, False) for trial in trials]
+    return paired(np.array(were), np.array(are))
 
 
 def measure(
@@ -160,7 +182,7 @@ def measure(
 def row_of(case: Saving, base: Mapping[str, Hits], after: Mapping[str, Hits]) -> Row:
     """The row of a change: the points that it gains, and what it saves."""
     gains = {
-        f"{task}, points": points(difference(base[task], after[task]))
+        f"{task}, points": points(difference(base[task], after[task], fewer=case.fewer))
         for task in base
         if task in after
     }

@@ -89,10 +89,14 @@ class TestCosts:
     def test_a_contact_that_is_no_longer_noticed_is_wrong(self):
         before = {(Path(name), 0): True for name in "abcd"}
         after = {(Path(name), 0): True for name in "ab"}
-        assert costs.difference(before, after)[0] == -50.0
+        assert costs.difference(before, after, fewer=False)[0] == -50.0
+        assert costs.difference(before, after, fewer=True)[0] == 0.0
 
     @pytest.mark.slow
-    def test_every_change_is_measured_on_its_own_recordings(self, recordings):
+    def test_every_change_is_measured_on_its_own_recordings(
+        self, recordings, monkeypatch
+    ):
+        monkeypatch.setattr(costs, "FEWEST", 8)
         raw = read([recordings])
         cases = {case.name: case for case in costs.changes(raw, followed(raw), 100.0)}
         assert list(cases) == [
@@ -103,7 +107,9 @@ class TestCosts:
             "6 taxels",
             "1 taxel",
             "the paper's features",
+            "8 of 16 trials",
         ]
+        assert cases["8 of 16 trials"].price == "8 recordings fewer"
         assert cases["24 taxels"].source.recordings[0].frames.shape[1:] == (4, 6)
         assert cases["24 taxels"].price == "24 of 384 taxels to read"
 
