@@ -30,7 +30,9 @@ def tracker(recording, features):
     return ContactTracker(layout, chain=Chain.cody(), measures=measured)
 
 
-@pytest.mark.parametrize("names", [*(name for name in SETS if "shear" not in name), WHOLE])
+@pytest.mark.parametrize(
+    "names", [*(name for name in SETS if "shear" not in name), WHOLE]
+)
 def bench_features(against, note, names):
     features = together(names)
     recording = load(FOLDER / "pillow-movable.npz")
