@@ -11,7 +11,7 @@ from edge.decide.model import Model
 from export import c_code
 from export.image import Pools, packed_row
 from tests.export.microcontroller.comparison import needs_gcc
-from tests.export.microcontroller.machine import COMMON
+from tests.export.microcontroller.machine import COMMON, DEFINED
 
 ACCEPTED, NO_MODEL_THERE, DAMAGED, OF_ANOTHER_SKIN, TOO_LARGE = range(5)
 
@@ -23,7 +23,7 @@ def firmware(tmp_path_factory):
     c_code.export(Model(demo.MODEL), folder)
     sources = [path for path in folder.glob("*.c") if path.name != "main.c"]
     words = ["-shared", "-fPIC", *sources, "-o", folder / "model.so"]
-    subprocess.run(["gcc", *COMMON, *words], check=True)
+    subprocess.run(["gcc", *COMMON, *DEFINED, "-O1", *words], check=True)
     return ctypes.CDLL(folder / "model.so"), (folder / "model.bin").read_bytes()
 
 
