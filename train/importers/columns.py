@@ -50,6 +50,8 @@ EPOCHS = {"ns": 9e17, "us": 9e14, "ms": 9e11, "s": 9e8}
 LONGEST_STEP = 0.25
 DOUBTFUL_BELOW = 3.0
 """Median steps that are certainly in a unit, and that may be in the next smaller one."""
+LIKELY_TIMES = 3
+"""Columns that rise, which a sentence names at most."""
 TAXELS = re.compile("taxel|tactile", re.I)
 """How a name begins that is a taxel's even beside others with running numbers."""
 
@@ -218,7 +220,7 @@ def _time_column(
         typed(table, [name])
         for name in numbers
         if (numbers[name].diff()[1:] > 0.0).all()
-    ]
+    ][:LIKELY_TIMES]
     raise InputError(
         f"{table.where}: no column is called a time; give --rate HZ, such as --rate 100, "
         f"or --time {' or '.join(rising) or 'COL'}, among {short_text(table.names)}"
