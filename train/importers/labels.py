@@ -10,8 +10,7 @@ import pandas as pd
 
 from edge.config import short_text
 from edge.errors import InputError
-from edge.record.labels import TABLE, Row, read_table
-from edge.record.labels import Table as LabelTable
+from edge.record.labels import TABLE, LabelTable, Row, read_table
 from train.importers.forms.file import inner
 from train.importers.forms.long import plain
 from train.importers.forms.text import is_number

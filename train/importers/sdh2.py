@@ -22,7 +22,7 @@ from edge.files import parsing
 from edge.record.recording import Recording
 from edge.touch.arm import Chain
 from edge.touch.layout import RELEASE_S, SkinLayout
-from train.importers import Trial, clock
+from train.importers import ImportedTrial, clock
 from train.importers.forms.file import read_unpacked
 
 PADS = (1, 5)
@@ -36,7 +36,7 @@ ONSET_COUNTS = 60
 contact."""
 
 
-def trials(path: Path, arm: Chain | None = None) -> Iterator[Trial]:
+def trials(path: Path, arm: Chain | None = None) -> Iterator[ImportedTrial]:
     """One recording for each file: the two pads side by side, with an invalid column
     between them.
 
@@ -55,7 +55,7 @@ def trials(path: Path, arm: Chain | None = None) -> Iterator[Trial]:
         )
     for i, file in enumerate(paths):
         recording = grasp(file)
-        yield Trial(f"{i:04d}_{recording.labels['object']}", recording)
+        yield ImportedTrial(f"{i:04d}_{recording.labels['object']}", recording)
 
 
 def files(folder: Path) -> list[Path]:
