@@ -297,7 +297,7 @@ def read_meta(path: str | os.PathLike[str]) -> dict[str, Any]:
         InputError: as `load`.
     """
     name = os.fspath(path)
-    meta = load_meta(name, load_arrays(name, keys=("meta",), known=PARTS))
+    meta = load_meta(name, load_arrays(name, keys=("meta",), allowed=PARTS))
     with about(name):
         return {**meta, "labels": read_labels(name, meta.get("labels", {}))}
 
@@ -327,7 +327,7 @@ def load(
             says, or the file is missing; the sentence names it and the remedy.
     """
     name = os.fspath(path)
-    arrays = load_arrays(name, file, known=PARTS)
+    arrays = load_arrays(name, file, allowed=PARTS)
     for key in ("t", "frames"):
         if key not in arrays:
             raise InputError(

@@ -187,12 +187,12 @@ def meaning(table: Table, options: TableOptions) -> Meaning:
     """
     joints = columns(table, options.joints) if options.joints else []
     time = _time_column(table, joints, options)
-    used = {time, *joints}
+    in_use = {time, *joints}
     if options.onset_column:
-        used.add(column(table, "--onset-column", options.onset_column))
-    rest = [name for name in table.names if name not in used]
+        in_use.add(column(table, "--onset-column", options.onset_column))
+    rest = [name for name in table.names if name not in in_use]
     taxels, shape = _taxels(table, rest, options)
-    for name in used.intersection(taxels):
+    for name in in_use.intersection(taxels):
         raise InputError(
             f"{table.where}: column {name} is named both as a taxel and as time, joint "
             "or onset"
@@ -378,5 +378,5 @@ def onsets_of(
         return [float(t[0])] if options.onset else []
     name = column(table, "--onset-column", options.onset_column)
     cells = table.data[name].astype(str).to_numpy()
-    left = cells != cells[0]
-    return [float(at) for at in t[1:][left[1:] & ~left[:-1]]]
+    is_away = cells != cells[0]
+    return [float(at) for at in t[1:][is_away[1:] & ~is_away[:-1]]]

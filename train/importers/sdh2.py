@@ -147,12 +147,14 @@ def _pads(root: ElementTree.Element) -> Pads:
         cells += rows * cols
     if sorted(places) != list(PADS):
         raise ValueError(f"it lacks matrix {PADS[0]} or {PADS[1]}, the pads that touch")
-    left, right = (places[pad] for pad in PADS)
-    if left.shape != right.shape:
-        raise ValueError(f"its pads differ: {left.shape} and {right.shape} texels")
-    between = np.full((len(left), 1), cells)
-    side_by_side = np.hstack([left, between, right])
-    working = np.hstack([alive[PADS[0]], between < cells, alive[PADS[1]]])
+    left_pad, right_pad = (places[pad] for pad in PADS)
+    if left_pad.shape != right_pad.shape:
+        raise ValueError(
+            f"its pads differ: {left_pad.shape} and {right_pad.shape} texels"
+        )
+    gap = np.full((len(left_pad), 1), cells)
+    side_by_side = np.hstack([left_pad, gap, right_pad])
+    working = np.hstack([alive[PADS[0]], gap < cells, alive[PADS[1]]])
     return Pads(side_by_side, working, cells, pitch_m)
 
 
