@@ -20,13 +20,13 @@ from train.importers.options import UNITS_S, TableOptions
 from train.importers.table import Table, numbered, numbers_of, require_converted
 
 UNIT_NAMES = {
-    "s": "s sec second seconds",
-    "ms": "ms msec millis milliseconds",
-    "us": "us usec µs micros microseconds",
-    "ns": "ns nsec nanos nanoseconds",
+    "s": ("s", "sec", "second", "seconds"),
+    "ms": ("ms", "msec", "millis", "milliseconds"),
+    "us": ("us", "usec", "µs", "micros", "microseconds"),
+    "ns": ("ns", "nsec", "nanos", "nanoseconds"),
 }
 """{unit: its names}."""
-UNITS = {name: unit for unit, names in UNIT_NAMES.items() for name in names.split()}
+UNITS = {name: unit for unit, names in UNIT_NAMES.items() for name in names}
 TIME = re.compile(
     r"(?:(?:elapsed|relative|rel|system|sys|log|frame)[ _]*)?"
     r"(?:ts|t|time|time_?stamp|stamp|clock|datetime|epoch|zeit|zeitstempel)"
