@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from edge.arrays import Counts, Floats
+from edge.arrays import Booleans, Counts, Floats
 from edge.config import ConfigTable, limited, parse_toml
 from edge.errors import InputError
 from edge.files import read_text
@@ -104,6 +104,15 @@ class SkinFile:
         """The flat indices of the taxels that have a chip."""
         return [taxel for chip in self.chips for taxel in chip.served]
 
+    @property
+    def working(self) -> Booleans:
+        """(rows, cols), True on the taxels that have a chip and are not dead."""
+        has_chip = np.zeros(self.layout.shape, dtype=np.bool_)
+        has_chip.flat[self.served] = True
+        for taxel in self.signal.dead:
+            has_chip[taxel] = False
+        return has_chip & self.layout.alive
+
 
 def load(path: str | os.PathLike[str]) -> SkinFile:
     """Read a skin's file.
@@ -149,7 +158,10 @@ def parse(text: str, where: str = "skin") -> SkinFile:
     named = top.table("labels", {})
     labels = {task: named.texts(task) for task in named.raw}
     top.refuse_unknown()
-    return SkinFile(name, layout, buses, signal, reading, calibration, where, labels)
+    file = SkinFile(name, layout, buses, signal, reading, calibration, where, labels)
+    if not file.working.any():
+        raise InputError(f"{where}: all taxels that have a chip are dead")
+    return file
 
 
 def _defaults(chips: Sequence[ChipSpec]) -> Defaults:

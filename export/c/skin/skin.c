@@ -59,7 +59,7 @@ static uint16_t unpacked(const uint8_t *bytes, uint32_t i, uint8_t bits) {
 }
 
 /* Values of the taxels of a chip into ec_raw, and whether each is intact into ec_read; whether all that
-   are served are. */
+   work are. */
 static bool decode(const ec_chip *chip) {
   const uint8_t *bytes = ec_bytes + chip->first_byte;
   const ec_calibration *rest = &ec_calibration_now;
@@ -87,8 +87,8 @@ static bool decode(const ec_chip *chip) {
       is_intact &= -EC_REACH <= away && away <= EC_REACH;
     }
     ec_raw[taxel] = value;
-    ec_read[taxel] = is_intact && ec_served[taxel];
-    all &= is_intact || !ec_served[taxel];
+    ec_read[taxel] = is_intact && ec_working[taxel];
+    all &= is_intact || !ec_working[taxel];
   }
   return all;
 }
