@@ -60,7 +60,7 @@ def _untouched(dataset: DataSet) -> Iterator[str]:
 
 
 def _left_out(dataset: DataSet) -> Iterator[str]:
-    """Sentences on recordings, and on contacts of a recording, that are not used."""
+    """Sentences on recordings, and on contacts of a recording, that are not dataset."""
     files = {trial.path for trial in dataset.trials}
     for lacking, paths in dataset.left_out.items():
         yield (
@@ -69,7 +69,7 @@ def _left_out(dataset: DataSet) -> Iterator[str]:
         )
     if dataset.unused:
         yield (
-            "warning: only the first of several contacts is used in "
+            "warning: only the first of several contacts is dataset in "
             f'{_files(dataset.unused)}; with meta.contacts of "alike" each is a trial'
         )
 
@@ -92,9 +92,9 @@ def _outliers(fitted: Fitted) -> Iterator[str]:
         if "kernels" not in name and not measures.feature(name).quantity.wide
     ]
     if names:
-        used = fitted.dataset.of(names)
-        X = used.features(fitted.window_s, fitted.samples)
-        yield from outliers.by_features(used, X, used.widths(fitted.samples))
+        dataset = fitted.dataset.of(names)
+        X = dataset.features(fitted.window_s, fitted.samples)
+        yield from outliers.by_features(dataset, X, dataset.widths(fitted.samples))
 
 
 def _task_warnings(fitted: Fitted, task: str) -> Iterator[str]:

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 from edge.errors import InputError
 from train.json_files import json_file
-from train.report.section import Section, Table
+from train.report.section import ReportTable, Section
 
 STAGES = ("track", "features", "decision")
 
@@ -82,7 +82,11 @@ def section(board: Board) -> Section:
             "tradeoff` measures a quick model. Another board has other times: run "
             "`edge-classify bench` on it, and give the file as `BOARD=board.json`.",
         ],
-        [Table("board", "Stages", rows, timed=("median us", "99th percentile us"))],
+        [
+            ReportTable(
+                "board", "Stages", rows, timed=("median us", "99th percentile us")
+            )
+        ],
     )
 
 

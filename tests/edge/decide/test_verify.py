@@ -35,14 +35,14 @@ def test_the_value_that_differs_is_shown():
     check = compared("it", values, golden)
     assert not check.passed
     assert check.row == 1
-    assert check.seen == "7"
+    assert check.value == "7"
     assert check.expected == "3"
 
 
 def test_another_shape_is_a_difference():
     check = compared("it", np.zeros((2, 3)), np.zeros((2, 4)))
     assert not check.passed
-    assert check.seen == "shape (2, 3)"
+    assert check.value == "shape (2, 3)"
     assert check.expected == "(2, 4)"
 
 

@@ -135,6 +135,7 @@ FORMS = {
         json.dumps({"payload": SAMPLE | {"values": COUNTS.tolist()}}),
     ),
     "JSON": ("cup_1.json", TABLE.to_json(orient="records")),
+    "JSON of columns": ("cup_1.json", json.dumps(TABLE.to_dict("list"), indent=1)),
     "JSON lines": ("cup_1.jsonl", LISTS.to_json(orient="records", lines=True)),
     "a row for each value": ("cup_1.csv", text(LONG)),
     "long table": (
