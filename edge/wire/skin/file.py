@@ -94,6 +94,11 @@ class SkinFile:
     labels: Mapping[str, Sequence[str]] = field(default_factory=dict)
     """{task: the labels that a person may choose from}."""
 
+    def __post_init__(self) -> None:
+        """Refuse a skin of which nothing works."""
+        if not self.working.any():
+            raise InputError(f"{self.path}: all taxels that have a chip are dead")
+
     @property
     def chips(self) -> list[ChipSpec]:
         """All chips, bus by bus."""
@@ -158,10 +163,7 @@ def parse(text: str, where: str = "skin") -> SkinFile:
     named = top.table("labels", {})
     labels = {task: named.texts(task) for task in named.raw}
     top.refuse_unknown()
-    file = SkinFile(name, layout, buses, signal, reading, calibration, where, labels)
-    if not file.working.any():
-        raise InputError(f"{where}: all taxels that have a chip are dead")
-    return file
+    return SkinFile(name, layout, buses, signal, reading, calibration, where, labels)
 
 
 def _defaults(chips: Sequence[ChipSpec]) -> Defaults:
