@@ -187,7 +187,7 @@ static void find_changes(int32_t changes[EC_TAXELS]) {
 /* Whether taxels side by side have moved as under a touch. */
 static bool any_touched(void) {
   static int32_t changes[EC_TAXELS];
-  int32_t limit = ec_calibration_now.is_known && EC_SKIN_THRESHOLD ? EC_SKIN_THRESHOLD : EC_SKIN_ONSET;
+  int32_t limit = ec_calibration_now.is_known && EC_SKIN_THRESHOLD > 0 ? EC_SKIN_THRESHOLD : EC_SKIN_ONSET;
   if (EC_SKIN_ONSET == 0) return false;
   find_changes(changes);
   for (uint32_t i = 0; i < EC_TAXELS; i++) {
