@@ -60,7 +60,7 @@ def _untouched(dataset: DataSet) -> Iterator[str]:
 
 
 def _left_out(dataset: DataSet) -> Iterator[str]:
-    """Sentences on recordings, and on contacts of a recording, that are not dataset."""
+    """Sentences on recordings, and on contacts of a recording, that are not used."""
     files = {trial.path for trial in dataset.trials}
     for lacking, paths in dataset.left_out.items():
         yield (
@@ -69,7 +69,7 @@ def _left_out(dataset: DataSet) -> Iterator[str]:
         )
     if dataset.unused:
         yield (
-            "warning: only the first of several contacts is dataset in "
+            "warning: only the first of several contacts is used in "
             f'{_files(dataset.unused)}; with meta.contacts of "alike" each is a trial'
         )
 

@@ -40,7 +40,7 @@ def load_arrays(
         path: of the file, for errors.
         file: its contents, if they have been read already.
         keys: names of arrays; those that the file has are read. None reads all.
-        names: of the parts that the file may have; any where there are none.
+        allowed: names of the parts that the file may have; any where there are none.
 
     Raises:
         InputError: the file is missing, damaged, larger than `LARGEST_BYTES`, or holds

@@ -193,7 +193,7 @@ def stripped(events):
 
 
 def strip(event):
-    unequal = ("contact", "place", "latency_ms")
+    unequal = ("contact", "position", "latency_ms")
     return {key: value for key, value in event.items() if key not in unequal}
 
 
@@ -230,7 +230,7 @@ def test_each_contact_is_decided_and_placed_on_its_own(two_touches, tmp_path, ed
     }
     late_s = second[0]["onset_s"] - first[0]["onset_s"]
     assert late_s == pytest.approx(0.36, abs=0.02)  # 0.04 their own
-    places = [first[0]["place"], second[0]["place"]]
+    places = [first[0]["position"], second[0]["position"]]
     # Opposite sides of the forearm.
     assert np.linalg.norm(np.subtract(*places)) > two_touches.layout.radius_m
 
