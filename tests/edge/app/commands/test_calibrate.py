@@ -96,6 +96,33 @@ def test_taxels_that_are_not_read_or_saturated_keep_their_former_values_by_force
     assert skinfile.load(skin).calibration.baseline[0, 2] == 20946
 
 
+@pytest.mark.parametrize(
+    ("line", "dead"),
+    [("[skin]", "[0, 1, 2, 24, 25]"), ("[signal]", "[[0, 0], [0, 1], [0, 2], [1, 0]]")],
+)
+def test_dead_taxels_are_neither_read_nor_in_the_way(edge, skin, quiet, line, dead):
+    """Also after a calibration in which they worked, and rested elsewhere."""
+    words = ("calibrate", "--skin", skin, "--fake", quiet, "--frames", 20, "--yes")
+    assert edge(*words)[0] == 0
+    text = skin.read_text().replace("dead = []", "")
+    skin.write_text(text.replace(f"{line}\n", f"{line}\ndead = {dead}\n"))
+    for _ in range(2):
+        assert edge(*words)[1][0]["moving"] == []
+        assert skinfile.load(skin).calibration.baseline[0, :4].tolist() == [
+            0,
+            0,
+            0,
+            20946,
+        ]
+
+
+def test_a_skin_on_which_all_is_dead_is_refused(edge, skin):
+    text = skin.read_text().replace("dead = []", "")
+    every = list(range(384))
+    skin.write_text(text.replace("[skin]\n", f"[skin]\ndead = {every}\n"))
+    assert edge("check", skin)[0] == 2
+
+
 SIX = [(5, 5), (5, 6), (5, 7), (6, 5), (6, 6), (6, 7)]
 
 

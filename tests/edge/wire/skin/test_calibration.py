@@ -14,11 +14,12 @@ from edge.wire.skin.calibration import (
 
 
 def test_a_taxel_is_noisy_beyond_the_limit_and_not_at_it():
-    noise = np.full((3, 4), 2.0)
+    file = skinfile.load(skinfile.shipped("mpr121"))
+    noise = np.full(file.layout.shape, 2.0)
     noise[0, 1] = NOISY * 2.0 + NOISY_COUNTS
-    assert noisiest_taxels(noise) == []
+    assert noisiest_taxels(file, noise) == []
     noise[2, 3], noise[1, 0] = noise[0, 1] + 1.0, noise[0, 1] + 9.0
-    assert noisiest_taxels(noise) == [(1, 0), (2, 3)]
+    assert noisiest_taxels(file, noise) == [(1, 0), (2, 3)]
 
 
 def test_only_the_values_of_a_block_may_rest_at_0():
