@@ -35,11 +35,6 @@ def test_the_papers_numbers_are_46_shares_of_140_trials():
     assert right.to_numpy() == pytest.approx(right.round().to_numpy(), abs=0.008)
 
 
-def test_the_numbers_without_scaling_are_the_headlines_of_section_iv_a():
-    headline = {task: PAPERS["II", "none", task] for task in set(PAPER.task)}
-    assert headline == {"category": 80.0, "mobility": 91.43, "object": 72.14}
-
-
 def test_predictions_are_counted_without_the_numbers_that_a_scene_was_fitted_to():
     ours = dict.fromkeys(PAPERS, 100.0)
     ours |= {key: PAPERS[key] for key in PAPERS if key[1] == HEADLINES[key[0]]}

@@ -88,17 +88,6 @@ def kept(make_touch, tmp_path):
     return tmp_path / "kept"
 
 
-def test_a_decision_is_accepted_where_it_names_a_label_and_nobody_has(kept, edge):
-    edge("label", kept, "--accept", "--yes")
-    after = {path.stem: load(path).labels for path in find([str(kept)])}
-    assert after == {
-        "sure": {"softness": "soft"},
-        "unsure": {"softness": "hard"},
-        "wrong": {"softness": "soft"},
-        "unknown": {"softness": "soft"},
-    }
-
-
 def test_a_decision_is_accepted_but_for_what_is_corrected(kept, edge):
     edge("label", kept / "unsure.npz", "--accept", "--set", "softness=soft", "--yes")
     assert load(kept / "unsure.npz").labels == {"softness": "soft"}

@@ -41,18 +41,6 @@ def test_all_checks_together_cost_at_most_4_percent_of_the_wire():
     assert sum(frame_bits(CODY)) <= 1.04 * 8320
 
 
-@pytest.mark.parametrize("file", [CODY, PAD], ids=["cody", "mpr121"])
-def test_every_taxel_is_where_the_file_says(file):
-    picture = PICTURE[: file.layout.rows, : file.layout.cols] % 400
-    floor = file.signal.dead_band_counts
-    with fake_skin(file, lambda t: picture) as skin:
-        frame = skin.read()
-    assert frame.valid.all()
-    np.testing.assert_array_equal(
-        frame.counts, np.where(picture < max(floor, 1), 0, picture)
-    )
-
-
 def test_buses_are_read_side_by_side_each_in_a_thread(monkeypatch):
     """Each bus waits in the middle of its frame until all have come so far."""
     with still(CODY) as skin:
