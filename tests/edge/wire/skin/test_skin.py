@@ -142,13 +142,13 @@ def test_taxels_that_fall_silent_are_heard_of_and_so_is_their_return():
     intact."""
     file = SKINS["block"]
     hangs = Fault("hold", bus=file.buses[1].device, during=(0.1, 1.6))
-    heard = []
+    reports = []
     with faulty_skin(file, lambda t: PICTURE, [hangs]) as skin:
         for frame in Loop(skin, lasts_s=2.0).frames():
             silent = skin.silent_changes()
-            heard += [] if silent is None else [(round(frame.t, 2), silent)]
+            reports += [] if silent is None else [(round(frame.t, 2), silent)]
     hung_s = (UNCHANGED_FRAMES + SILENT_FRAMES) * 0.01
-    assert heard == [
+    assert reports == [
         (pytest.approx(0.1 + hung_s, abs=0.021), 128),
         (pytest.approx(1.6), 0),
     ]
