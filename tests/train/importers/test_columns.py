@@ -40,21 +40,6 @@ def test_columns_that_are_called_taxels_are_taken_beside_other_running_numbers(n
 
 
 @pytest.mark.parametrize(
-    ("terms", "names"),
-    [
-        ("b,a", ["b", "a"]),
-        ("a-c", ["a", "b", "c"]),
-        ("2-3", ["b", "c"]),
-        ("q", ["q.1", "q.2"]),
-        ("hand.skin", ["hand.skin.1", "hand.skin.2"]),
-    ],
-)
-def test_columns_are_named_by_names_ranges_and_places(terms, names):
-    source = table("a", "b", "c", "d", "q.1", "q.2", "hand.skin.1", "hand.skin.2")
-    assert sense_of(source, taxels=terms, rate=10).taxels == names
-
-
-@pytest.mark.parametrize(
     ("wishes", "sentence"),
     [
         ({"taxels": "s3"}, r"a.csv: has no column s3; it has \['t', 's1', 's2'\]"),

@@ -442,7 +442,7 @@ def test_labels_and_the_names_of_trials_stand_as_they_are(folder):
     assert recordings["7"].t == pytest.approx([0.0, 0.1, 0.2])
 
 
-def test_trials_and_labels_in_arrays_and_parquet_are_texts(folder):
+def test_trials_and_labels_in_parquet_are_texts(folder):
     pytest.importorskip("pyarrow")
     content = [["a", "1", t, t] for t in (0, 10)] + [["b", None, t, t] for t in (0, 10)]
     frames = pd.DataFrame(content, columns=["trial", "softness", "t", "p1"])
@@ -450,11 +450,6 @@ def test_trials_and_labels_in_arrays_and_parquet_are_texts(folder):
     _, recordings = imported(folder)
     assert recordings["a"].labels == {"softness": "1"}
     assert recordings["b"].labels == {}
-    numbers = np.array([[0.0], [0.0], [7.0]])
-    savemat(folder / "x.mat", {"trial": numbers, "t": numbers.T % 7, "p1": numbers})
-    (folder / "all.parquet").unlink()
-    _, recordings = imported(folder, "--rate", "1")
-    assert len(recordings["0.0"].t) == 2
 
 
 def test_onsets_from_outside_are_kept(folder):

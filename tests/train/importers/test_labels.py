@@ -2,7 +2,7 @@
 
 import pytest
 
-from tests.train.importers.test_csv import RATE, imported, put
+from tests.train.importers.test_csv import imported, put
 from train.__main__ import main
 
 TRIAL = "t,p1\n0,1\n0.1,2\n"
@@ -106,11 +106,3 @@ def test_a_row_of_a_file_that_is_not_imported_is_no_slip(folder, capsys):
     assert "names no file" not in error
     out = str(folder.parent / "one")
     assert main(["import", "csv", str(folder / "r0.csv"), "--out", out]) == 0
-
-
-def test_labels_stand_as_they_are_in_any_spreadsheets_form(folder):
-    table = "\ufefftrial;object;softness\r\n1;012;\r\n2;None;1\r\n"
-    put(folder, {"1.txt": "1 2\n1 3\n", "2.txt": "1 2\n1 3\n", "labels.csv": table})
-    _, recordings = imported(folder, *RATE)
-    assert recordings["1"].labels == {"object": "012"}
-    assert recordings["2"].labels == {"object": "None", "softness": "1"}

@@ -15,21 +15,6 @@ FRAMES = np.arange(24).reshape(6, 4)
 
 
 @pytest.mark.parametrize(
-    ("stored", "form"),
-    [
-        ({"t": np.arange(6.0), "skin": FRAMES}, "time is axis 1 of skin"),
-        ({"t": np.arange(6.0), "skin": FRAMES.T}, "time is axis 2 of skin"),
-        ({"skin": FRAMES}, "time is axis 1 of skin"),
-    ],
-)
-def test_the_axis_of_time_is_that_of_the_other_arrays(stored, form):
-    table = table_of("a.mat", stored, OPTIONS)
-    assert form in table.form
-    skin = [name for name in table.names if name.startswith("skin")]
-    assert table.data[skin].to_numpy().tolist() == FRAMES.tolist()
-
-
-@pytest.mark.parametrize(
     ("stored", "sentence"),
     [
         ({"a": np.ones((6, 6)), "b": np.ones((6, 2))}, "which axis of a"),
