@@ -167,8 +167,7 @@ def _tables(file: SkinFile, hz: int) -> dict[str, Any]:
     return {
         "retries": [0, *(error.retries for error in OUTCOMES)],
         "first_chips": ends,
-        "alive": file.layout.alive.ravel(),
-        "served": taxels.served,
+        "working": taxels.served,
         "signs": taxels.sign,
         "calibration": _calibration(file),
         "scripts": scripts,

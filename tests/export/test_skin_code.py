@@ -366,6 +366,8 @@ def verdict(file, skin, frames, nothing_touches):
 
 
 QUIET = np.zeros(SMALL.layout.shape, np.uint16)
+DEAD = tuple((row, col) for row in range(4) for col in range(6, 19))
+"""More than half of the taxels; none of them counts."""
 
 
 def pressed(*taxels, by=700):
@@ -382,6 +384,7 @@ SCENES = {
     "above": (pressed((1, 3), (2, 3)), 2.0, (3, 3)),
     "around": (pressed((0, 0), (0, 23)), 2.0, (3, 3)),
     "alone": (pressed((1, 3), (3, 3)), 2.0, (0, 0)),
+    "dead": (pressed((1, 8), (2, 8), by=60000), 2.0, (0, 0)),
     "saturated": (pressed((0, 0), by=60000), 2.0, (1, 1)),
     "noisy": (pressed(), 9.0, (4, 4)),
     "restless": (
@@ -394,7 +397,8 @@ SCENES = {
 
 @pytest.mark.parametrize("former", [False, True])
 def test_it_is_calibrated_or_refused_as_by_python(former, tmp_path):
-    file = SMALL if former else replace(SMALL, calibration=None)
+    file = replace(SMALL, signal=replace(SMALL.signal, dead=DEAD))
+    file = file if former else replace(file, calibration=None)
     for name, (scene, noise, outcomes) in SCENES.items():
         says = name != "unsaid"
         wires = [Wired(file, scene, noise) for _ in range(2)]

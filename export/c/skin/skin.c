@@ -59,7 +59,7 @@ static uint16_t unpacked(const uint8_t *bytes, uint32_t i, uint8_t bits) {
 }
 
 /* Values of the taxels of a chip into ec_raw, and whether each is intact into ec_read; whether all that
-   are served are. */
+   work are. */
 static bool decode(const ec_chip *chip) {
   const uint8_t *bytes = ec_bytes + chip->first_byte;
   const ec_calibration *rest = &ec_calibration_now;
@@ -87,8 +87,8 @@ static bool decode(const ec_chip *chip) {
       is_intact &= -EC_REACH <= away && away <= EC_REACH;
     }
     ec_raw[taxel] = value;
-    ec_read[taxel] = is_intact && ec_served[taxel];
-    all &= is_intact || !ec_served[taxel];
+    ec_read[taxel] = is_intact && ec_working[taxel];
+    all &= is_intact || !ec_working[taxel];
   }
   return all;
 }
@@ -120,8 +120,7 @@ static uint8_t beside(int32_t row, int32_t col, uint8_t mask, uint8_t bits) {
   uint8_t count = 0;
   for (int32_t r = row - 1; r <= row + 1; r++) {
     for (int32_t c = col - 1; c <= col + 1; c++) {
-      int32_t at = c;
-      if (EC_SKIN_WRAPS && EC_SKIN_COLS > 2) at = (c + EC_SKIN_COLS) % EC_SKIN_COLS;
+      int32_t at = EC_SKIN_WRAPS && EC_SKIN_COLS > 2 ? (c + EC_SKIN_COLS) % EC_SKIN_COLS : c;
       bool is_inside = r >= 0 && r < EC_SKIN_ROWS && at >= 0 && at < EC_SKIN_COLS;
       if (!is_inside || (r == row && at == col)) continue;
       count = (uint8_t)(count + ((states[r * EC_SKIN_COLS + at] & mask) == bits));
@@ -133,11 +132,11 @@ static uint8_t beside(int32_t row, int32_t col, uint8_t mask, uint8_t bits) {
 /* Find taxels that are broken: above the threshold alone, for longer than a touch. */
 static void follow_lone(uint64_t t, uint32_t since) {
   for (uint32_t i = 0; i < EC_TAXELS; i++) {
-    bool above = ec_read[i] && counts[i] > EC_TOUCH_COUNTS;
+    bool touched = ec_read[i] && counts[i] > EC_TOUCH_COUNTS;
     states[i] &= BROKEN | AT_START;
     if (ec_read[i]) states[i] |= VALID;
-    if (above && !(states[i] & BROKEN)) states[i] |= ACTIVE;
-    silent_for[i] = above ? 0 : silent_for[i] == NEVER ? NEVER : older(silent_for[i], since);
+    if (touched && !(states[i] & BROKEN)) states[i] |= ACTIVE;
+    silent_for[i] = touched ? 0 : silent_for[i] == NEVER ? NEVER : older(silent_for[i], since);
   }
   for (uint32_t i = 0; i < EC_TAXELS; i++) {
     int32_t row = (int32_t)(i / EC_SKIN_COLS);

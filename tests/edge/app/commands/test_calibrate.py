@@ -25,11 +25,12 @@ from tests.edge.test_writing import left_by_a_dead_run
 
 
 def test_a_taxel_is_noisy_beyond_the_limit_and_not_at_it():
-    noise = np.full((3, 4), 2.0)
+    file = skinfile.load(skinfile.shipped("mpr121"))
+    noise = np.full(file.layout.shape, 2.0)
     noise[0, 1] = NOISY * 2.0 + NOISY_COUNTS
-    assert noisiest_taxels(noise) == []
+    assert noisiest_taxels(file, noise) == []
     noise[2, 3], noise[1, 0] = noise[0, 1] + 1.0, noise[0, 1] + 9.0
-    assert noisiest_taxels(noise) == [(1, 0), (2, 3)]
+    assert noisiest_taxels(file, noise) == [(1, 0), (2, 3)]
 
 
 @pytest.fixture
@@ -109,6 +110,33 @@ def test_taxels_that_are_not_read_or_saturated_keep_their_former_values_by_force
     assert skin.read_text() == before
     assert measured(quiet, "--force")[1]["kept"] == 1
     assert skinfile.load(skin).calibration.baseline[0, 2] == 20946
+
+
+@pytest.mark.parametrize(
+    ("line", "dead"),
+    [("[skin]", "[0, 1, 2, 24, 25]"), ("[signal]", "[[0, 0], [0, 1], [0, 2], [1, 0]]")],
+)
+def test_dead_taxels_are_neither_read_nor_in_the_way(edge, skin, quiet, line, dead):
+    """Also after a calibration in which they worked, and rested elsewhere."""
+    words = ("calibrate", "--skin", skin, "--fake", quiet, "--frames", 20, "--yes")
+    assert edge(*words)[0] == 0
+    text = skin.read_text().replace("dead = []", "")
+    skin.write_text(text.replace(f"{line}\n", f"{line}\ndead = {dead}\n"))
+    for _ in range(2):
+        assert edge(*words)[1][0]["moving"] == []
+        assert skinfile.load(skin).calibration.baseline[0, :4].tolist() == [
+            0,
+            0,
+            0,
+            20946,
+        ]
+
+
+def test_a_skin_on_which_all_is_dead_is_refused(edge, skin):
+    text = skin.read_text().replace("dead = []", "")
+    every = list(range(384))
+    skin.write_text(text.replace("[skin]\n", f"[skin]\ndead = {every}\n"))
+    assert edge("check", skin)[0] == 2
 
 
 def test_only_the_values_of_a_block_may_rest_at_0():
