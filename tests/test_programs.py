@@ -103,5 +103,5 @@ def test_options_of_a_check_reach_its_last_step_and_a_failed_step_ends_it(monkey
     assert checks.main(["--out", "o", "shifts", "--model", "m", "--help"]) == 1
     assert [step[0] for step in steps[:2]] == ["train", "export"]
     assert steps[2][-3:] == ("--model", "m", "--help")
-    assert checks.main(["--data", "a", "b", "--", "stopping"]) == 1
-    assert steps[3:] == [("tests.checks.bench.stopping", "--data", "a", "b")]
+    assert checks.main(["--data", "a", "b", "--", "remount"]) == 1
+    assert steps[3:] == [("tests.checks.remount", "--recordings", "a", "b")]

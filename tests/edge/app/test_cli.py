@@ -10,7 +10,6 @@ from pathlib import Path
 
 import pytest
 
-from edge import __version__
 from edge.__main__ import main as start
 from edge.app import cli
 from edge.demo import MODEL
@@ -140,10 +139,6 @@ def test_a_stream_that_was_closed_before_the_start_is_no_traceback(closed, tmp_p
     subprocess.run(["sh", "-c", redirected], cwd=ROOT, timeout=60)
     assert Path(f"{log}.status").read_text() == "0\n"
     assert "Traceback" not in Path(f"{log}.err").read_text()
-
-
-def test_the_version_is_the_package_s():
-    assert python("-m", "edge", "--version").stdout == f"edge-classify {__version__}\n"
 
 
 EMPTY = [

@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 
 from tests.train.importers import test_csv
-from train.__main__ import main
 from train.importers.axes import lettered
 
 FRAMES = 60
@@ -74,8 +73,7 @@ def test_other_names_have_no_axis(name):
 @pytest.mark.parametrize(
     "write",
     [
-        partial(write_table, names=named("s{i}_{a}")),
-        partial(write_table, names=named("f{a}{i}")),
+        partial(write_table, names=named()),
         columns_in_another_order,
         three_arrays,
         an_array_whose_last_axis_is_three,
@@ -116,20 +114,6 @@ def test_what_is_not_three_axes_is_one_sentence(
 ):
     write_table(folder, names.split())
     assert sentence in refused("csv", folder, *options)
-
-
-@pytest.mark.parametrize(
-    ("options", "sentence"),
-    [
-        (("--axes", "xxyz"), "choose from 'xyz', 'xzy'"),
-        (("--falls", "--signed"), "not allowed with argument"),
-        (("--time", "t", "--rate", "9"), "not allowed with argument"),
-    ],
-)
-def test_options_that_are_at_odds_are_refused(options, sentence, tmp_path, capsys):
-    with pytest.raises(SystemExit):
-        main(["import", "csv", "x", "--out", str(tmp_path / "o"), *options])
-    assert sentence in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(("shear", "scale"), [(40000.0, "0.819175"), (0.25, "100")])

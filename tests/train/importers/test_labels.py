@@ -76,13 +76,6 @@ def test_a_column_of_texts_that_several_trials_share_is_a_task(folder, capsys):
     assert "ignored" not in capsys.readouterr().out
 
 
-def test_a_label_that_changes_within_a_file_is_a_question(folder, refused):
-    put(folder, {"walk_1.csv": rows_of("mud", "ice")})
-    message = refused("csv", folder)
-    assert "column label" in message
-    assert "--label folder" in message
-
-
 @pytest.mark.parametrize("word", ["9", "colour"])
 def test_a_label_that_is_not_there_is_refused(folder, refused, word):
     put(folder, {"cup_1.csv": TRIAL})

@@ -1,7 +1,6 @@
 """Labels of recordings, listed and changed."""
 
 from dataclasses import replace
-from pathlib import Path
 
 import pytest
 
@@ -42,22 +41,13 @@ def test_the_labels_of_a_folder_are_listed_and_its_files_left_alone(folder, a, e
 
 def test_a_file_is_relabelled_and_keeps_all_else(a, edge):
     before = load(a)
-    new = ("--set", "object=brick", "--set", "softness=rigid", "--yes")
-    _, lines, _ = edge("label", a, *new)
+    new = "--set object=brick --set softness=rigid --unset category --yes"
+    _, lines, _ = edge("label", a, *new.split())
     after = load(a)
     assert lines[0]["labels"] == after.labels
-    assert after.labels == {
-        "category": "rigid-fixed",
-        "object": "brick",
-        "softness": "rigid",
-    }
+    assert after.labels == {"object": "brick", "softness": "rigid"}
     assert (after.frames == before.frames).all()
     assert {**after.meta, "labels": before.labels} == before.meta
-
-
-def test_the_label_of_a_task_is_taken_away(a, edge):
-    edge("label", a, "--unset", "object", "--yes")
-    assert load(a).labels == {"category": "rigid-fixed"}
 
 
 def test_what_cannot_be_changed_leaves_every_file_as_it_was(a, refused):
@@ -98,19 +88,6 @@ def kept(make_touch, tmp_path):
     return tmp_path / "kept"
 
 
-@pytest.mark.parametrize(
-    ("words", "expected"),
-    [
-        (["unsure"], ["unknown", "unsure"]),
-        (["object", "unsure"], ["unknown"]),
-    ],
-)
-def test_touches_are_listed_by_what_asks_for_a_look(kept, edge, words, expected):
-    options = [f"--only={word}" for word in words]
-    _, lines, _ = edge("label", kept, *options)
-    assert [Path(line["file"]).stem for line in lines] == expected
-
-
 def test_a_decision_is_accepted_where_it_names_a_label_and_nobody_has(kept, edge):
     edge("label", kept, "--accept", "--yes")
     after = {path.stem: load(path).labels for path in find([str(kept)])}
@@ -147,11 +124,6 @@ def test_all_that_have_a_label_get_another_and_slips_are_told_with_their_files(
     )
     assert [line["file"] for line in lines[1]] == [str(tmp_path / "0.npz")]
     assert {load(path).labels["object"] for path in find([str(tmp_path)])} == {"cup"}
-
-
-def test_a_word_of_only_that_is_no_state_or_task_is_refused(kept, refused):
-    err = refused("label", kept, "--only", "softnes=soft")
-    assert "unsure, wrong, unlabelled, left_out, object, softness, or TASK=LABEL" in err
 
 
 def test_what_is_left_out_is_listed_so_and_put_back(kept, edge):

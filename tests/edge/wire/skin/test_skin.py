@@ -1,6 +1,7 @@
 """The skin over the fake: frames put together from buses, chips and stages."""
 
 import threading
+import time
 from dataclasses import replace
 
 import numpy as np
@@ -16,7 +17,7 @@ from edge.wire.skin import file as skinfile
 from edge.wire.skin.decoder import HELD_S
 from edge.wire.skin.file import Reading
 from edge.wire.skin.loop import Loop
-from edge.wire.skin.skin import SILENT_FRAMES, Skin
+from edge.wire.skin.skin import SILENT_FRAMES, Skin, SystemClock
 from edge.wire.skin.wiring import BusSpec
 from tests.checks.faults import SKINS
 from tests.edge.wire.skin.small import CHIP, CODY, PICTURE
@@ -184,3 +185,19 @@ def test_dead_taxels_are_not_silent():
     with still(replace(CODY, signal=signal)) as skin:
         assert not skin.read().valid[3, 4]
         assert not skin.invalid_for.any()
+
+
+def test_it_returns_no_sooner_than_it_was_asked_to():
+    clock = SystemClock()
+    moment = clock.now() + 0.002
+    clock.sleep_until(moment)
+    assert clock.now() >= moment
+
+
+def test_a_moment_that_has_passed_is_not_waited_for(monkeypatch):
+    clock = SystemClock()
+    slept = []
+    monkeypatch.setattr(time, "sleep", slept.append)
+    clock.sleep_until(clock.now() - 1.0)
+    clock.sleep_until(clock.now())
+    assert slept == []
