@@ -301,29 +301,20 @@ def test_every_transaction_and_frame_is_that_of_python(name, tmp_path):
 @pytest.mark.slow
 @pytest.mark.parametrize("name", FILES)
 def test_under_each_fault_every_transaction_and_frame_is_that_of_python(name, tmp_path):
+    """Beside another one that lasts for a while, and a third at the start."""
     file = FILES[name]
     scene = touches(file)
-    for fault in (KINDS | MORE).values():
-        for rate in RATES:
-            meets = [replace(fault, rate=rate)]
-            assert_same(file, tmp_path, meets, scene, 90, brown_outs=(30,))
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("name", FILES)
-def test_so_it_is_where_chips_fail_at_the_start_and_hang_for_a_while(name, tmp_path):
-    file = FILES[name]
     rng = np.random.default_rng(7)
     kinds = [*(KINDS | MORE).values()]
-    for _ in range(12):
-        begin, lasts = rng.uniform(0, 1.0, 2)
-        during = BEGIN_S + begin, BEGIN_S + begin + lasts
-        faults = [
-            replace(kinds[i], rate=rng.uniform(0, 1.0) ** 3, during=during)
-            for i in rng.choice(len(kinds), 3)
-        ]
-        at_start = [replace(kinds[rng.integers(len(kinds))], rate=rng.uniform(0, 0.5))]
-        assert_same(file, tmp_path, faults, touches(file), at_start=at_start)
+    for fault in kinds:
+        for rate in RATES:
+            second, third = (kinds[i] for i in rng.choice(len(kinds), 2))
+            begin_s, end_s = BEGIN_S + np.sort(rng.uniform(0.0, 0.9, 2))
+            second = replace(second, rate=rng.uniform() ** 3, during=(begin_s, end_s))
+            faults = [replace(fault, rate=rate), second]
+            at_start = [replace(third, rate=rng.uniform(0.0, 0.5))]
+            more = {"brown_outs": (30,), "at_start": at_start}
+            assert_same(file, tmp_path, faults, scene, 90, **more)
 
 
 def test_lone_and_held_taxels_and_drift_are_those_of_python(tmp_path):
