@@ -21,7 +21,7 @@ from edge.wire.chips.kinds import KINDS
 from edge.wire.skin import bus_reader, calibration, decoder, lone
 from edge.wire.skin.file import Signal, SkinFile
 from edge.writing import write_whole
-from export.c_code import array, literal, write_rooms
+from export.c_text import array, literal, write_rooms
 from export.image import ROOMS
 
 HZ = 1_000_000

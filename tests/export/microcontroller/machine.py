@@ -19,7 +19,7 @@ VECTOR, VECTORS_OF_RECORDING, COSTS, SELFTEST, EVENTS_OF_RECORDING = range(5)
 ABOUT_ITSELF = struct.pack("<II", SELFTEST, 0)
 """The question whether `ec_selftest` passes."""
 WARNINGS = "-Wall -Wextra -Werror -Wconversion -Wdouble-promotion -pedantic"
-COMMON = f"-std=c99 -O2 -ffp-contract=off {WARNINGS}".split()
+COMMON = f"-std=c99 -Os -ffp-contract=off {WARNINGS}".split()
 DEFINED = "-fsanitize=undefined -fno-sanitize-recover=all".split()
 """What C leaves undefined ends the program."""
 SANITIZED = [*DEFINED, "-fsanitize=address"]
