@@ -176,12 +176,14 @@ class TestCommand:
         path.write_text(
             "[trials]\ncount = 1\nafter_s = 0.3\n[step_s]\nbase = 0.01\n"
             '[[object]]\nname = "foam"\nfamily = "foam"\nconditions = ["fixed"]\n'
+            '[[object]]\nname = "wall"\nfamily = "rigid"\nconditions = ["fixed"]\n'
         )
         assert main(["simulate", str(path), "--explain"]) == 0
         out, err = capsys.readouterr()
         line = next(x for x in out.splitlines() if "lateral" in x)
         assert "family foam" in line
         assert "foam-fixed: 1 trials" in out
+        assert out.count("  viscous") == 1
         assert "not called for, and not loaded: cover, pop" in err
 
     @pytest.mark.parametrize(
