@@ -8,6 +8,7 @@ from pathlib import Path
 from tests.conftest import ROOT
 
 THROUGH = {
+    "export/c_text.py": "export/test_c_code.py",
     "export/formula.py": "edge/decide/test_knn.py",
     "edge/app/commands/demo.py": "test_demo_data.py",
     "edge/touch/contact.py": "edge/touch/test_track.py",
