@@ -195,7 +195,7 @@ def read_table(folder: Path, column: str = FILE) -> LabelTable:
         )
         cells = [(lines.line_num, [cell.strip() for cell in line]) for line in lines]
     header = cells[0][1] if cells else []
-    while header[1:] and not header[-1]:  # a spreadsheet may end lines with empty cells
+    while header and not header[-1]:  # a spreadsheet may end lines with empty cells
         header.pop()
     with about(f"{path}, line 1"):
         _check_header(header, column)

@@ -274,13 +274,15 @@ RATES = (0.01, 0.05, 0.2, 1.0)
 
 
 def touches(file):
-    """Touches of many taxels, and one that feels alone from the start."""
+    """Touches of many taxels, one that feels alone from the start, and one that feels
+    about as much as an AD7147 may."""
     picture = np.zeros(file.layout.shape, np.uint16)
     picture[: file.layout.rows // 2 + 1, 1:4] = 300
 
     def scene(t):
         counts = picture * (0.4 < t % 1.1 < 0.7)
         counts[0, -1] = 500 * (t < 0.9)
+        counts[-1, 0] = 42000
         return counts
 
     return scene
