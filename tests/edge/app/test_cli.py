@@ -182,17 +182,3 @@ def test_a_model_and_a_skin_may_stand_without_their_option(words, edge):
         answers.append((status, re.sub(r'"latency_ms": [\d.]+', "", out)))
     assert answers[0] == answers[1]
     assert answers[0][0] < 2
-
-
-@pytest.mark.parametrize(
-    ("words", "sentence"),
-    [
-        (["verify"], "a model is required: name its file"),
-        (["verify", "a.onnx", "b.onnx"], "unrecognized arguments: b.onnx"),
-        (["verify", "a.onnx", "--skin"], "unrecognized arguments: --skin"),
-    ],
-)
-def test_a_command_without_its_model_or_with_two_says_so(words, sentence, capsys):
-    with pytest.raises(SystemExit):
-        cli.main(words)
-    assert sentence in capsys.readouterr().err

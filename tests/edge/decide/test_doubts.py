@@ -28,29 +28,32 @@ def doubts(felt):
 TIMES = np.arange(140) * 0.01
 
 
-def test_an_ordinary_contact_raises_no_doubt():
-    assert doubts(series(TIMES, growing)) == set()
+def paused(pause_s, step_s=0.01):
+    """A contact whose frames pause once."""
+    times = np.arange(0.0, 1.4, step_s)
+    return series(np.where(times > 0.5, times + pause_s, times), growing)
 
 
-@pytest.mark.parametrize(("pause_s", "flags"), [(0.03, set()), (0.05, {"gap"})])
-def test_a_pause_of_a_twentieth_of_a_second_is_a_gap(pause_s, flags):
-    times = np.where(TIMES > 0.5, TIMES + pause_s, TIMES)
-    assert doubts(series(times, growing)) == flags
+def frozen(count):
+    """A contact of which so many frames repeat one."""
+    return series(TIMES, lambda i: growing(min(i, 50) if i <= 50 + count else i))
 
 
-@pytest.mark.parametrize(("pause_s", "flags"), [(0.2, set()), (0.5, {"gap"})])
-def test_of_slow_frames_a_pause_is_compared_with_the_usual_one(pause_s, flags):
-    times = np.arange(14) * 0.15
-    late = np.where(times > 0.5, times + pause_s - 0.15, times)
-    assert doubts(series(late, growing)) == flags
-
-
-@pytest.mark.parametrize(("frames", "flags"), [(9, set()), (12, {"frozen"})])
-def test_frames_that_repeat_for_a_tenth_of_a_second_are_frozen(frames, flags):
-    def frozen(i):
-        return growing(min(i, 50) if i <= 50 + frames else i)
-
-    assert doubts(series(TIMES, frozen)) == flags
+@pytest.mark.parametrize(
+    ("felt", "flags"),
+    [
+        (paused(0.0), set()),
+        (paused(0.03), set()),
+        (paused(0.05), {"gap"}),
+        # Of slow frames a pause is compared with the usual one.
+        (paused(0.05, 0.15), set()),
+        (paused(0.35, 0.15), {"gap"}),
+        (frozen(9), set()),
+        (frozen(12), {"frozen"}),
+    ],
+)
+def test_frames_that_pause_or_repeat_are_a_doubt(felt, flags):
+    assert doubts(felt) == flags
 
 
 LEAD = 30

@@ -44,6 +44,8 @@ def test_the_samples_of_each_cell_and_axis_stand_together():
         object.__setattr__(frame, "t", 0.5 * i)
     series = followed(FLAT, frames, features=["taxel_shear"]).series()
     vector = feature_vector(series, 1.0, 3, ["sqrt_taxel_shear"])
-    known = [(f.shear * f.valid[..., None] / 100.0).reshape(-1, 2) for f in frames]
-    expected = np.transpose(known, (2, 1, 0)).reshape(-1)
+    readable_forces = [
+        (f.shear * f.valid[..., None] / 100.0).reshape(-1, 2) for f in frames
+    ]
+    expected = np.transpose(readable_forces, (2, 1, 0)).reshape(-1)
     assert (np.sign(vector) * vector**2).tolist() == pytest.approx(expected, rel=1e-15)

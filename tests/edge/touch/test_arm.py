@@ -44,12 +44,6 @@ def test_missing_extra_and_non_finite_angles_are_named(q, word):
         Chain.cody().pose(q)
 
 
-@pytest.mark.parametrize("q", [[0, 0], [0, 0, math.nan, 0, 0]])
-def test_a_point_takes_no_others(q):
-    with pytest.raises(InputError):
-        Chain.cody().point(q, (0.0, 0.0, 0.0))
-
-
 @pytest.mark.parametrize(
     ("text", "word"),
     [

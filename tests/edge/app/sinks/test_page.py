@@ -134,12 +134,12 @@ def change(page, kind, *names, **more):
     act(page, kind, touches=touches, **more)
 
 
-def listed(page, **asked):
-    return act(page, "trials", **asked)["trials"]
+def listed(page, **query):
+    return act(page, "trials", **query)["trials"]
 
 
-def files(page, **asked):
-    return [touch["file"] for touch in listed(page, **asked)]
+def files(page, **query):
+    return [touch["file"] for touch in listed(page, **query)]
 
 
 def undo(page):
@@ -325,5 +325,5 @@ def test_a_picture_tells_when_the_list_has_changed(folder_page, pictures):
     folder_page.saved()
     folder_page.push(replace(still, t=2.0))
     assert pictures[0]["invalid"] == []
-    before, changed, saved = (picture["trials"] for picture in pictures)
-    assert saved > changed > before
+    before, changed, later = (picture["trials"] for picture in pictures)
+    assert later > changed > before

@@ -71,6 +71,6 @@ class Pad(MPR121):
 def test_an_owners_chip_has_the_time_on_the_wire_that_a_trade_off_counts(monkeypatch):
     kind = Kind(f"{__name__}.Pad", KINDS["mpr121"].model)
     monkeypatch.setitem(KINDS, "pad", kind)
-    own = parse(mpr121().replace('"mpr121"', '"pad"'))
-    assert own.chips[0].kind is Pad
-    assert frame_rate(own) == frame_rate(parse(mpr121()))
+    skin_of_pads = parse(mpr121().replace('"mpr121"', '"pad"'))
+    assert skin_of_pads.chips[0].kind is Pad
+    assert frame_rate(skin_of_pads) == frame_rate(parse(mpr121()))

@@ -140,7 +140,7 @@ def test_arrays_with_other_numbers_of_trials_are_named():
         list(trials_of(stored, "object"))
 
 
-def written(path, array):
+def file_of(path, array):
     """A file of one array, packed where its format packs."""
     if path.suffix == ".npy":
         np.save(path, array)
@@ -167,7 +167,7 @@ def test_an_empty_data_set_of_hdf5_is_left_out(tmp_path):
 
 @pytest.mark.parametrize("suffix", [".npy", ".npz", ".mat", ".h5"])
 def test_what_would_fill_the_memory_is_refused_before(tmp_path, suffix, monkeypatch):
-    path = written(tmp_path / f"a{suffix}", np.zeros((100, 100), np.uint8))
+    path = file_of(tmp_path / f"a{suffix}", np.zeros((100, 100), np.uint8))
     monkeypatch.setattr(arrays, "MOST_VALUES", 5000)
     with pytest.raises(InputError, match="values, more than the 5000 that are read"):
         read_arrays(File(path))
