@@ -28,6 +28,7 @@ from edge.record.saving import save
 from edge.touch.layout import SkinLayout
 from edge.wire.skin import file as skinfile
 from export import c_code, skin_code
+from export.c_text import literal
 from export.costs import SLICE
 from tests.conftest import ROOT, ended, export, in_a_row, touch
 from tests.edge.decide.test_knn import hostile
@@ -546,7 +547,7 @@ def test_what_cannot_be_written_is_one_sentence_and_leaves_no_file(tmp_path):
 
 def test_every_float_has_a_literal():
     values = [np.inf, -np.inf, np.nan, np.float32(0.5)]
-    assert [c_code.literal(value) for value in values] == [
+    assert [literal(value) for value in values] == [
         "(double)INFINITY",
         "-(double)INFINITY",
         "(double)NAN",
