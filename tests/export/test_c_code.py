@@ -28,6 +28,7 @@ from edge.record.saving import save
 from edge.touch.layout import SkinLayout
 from edge.wire.skin import file as skinfile
 from export import c_code, skin_code
+from export.c_text import literal
 from export.costs import SLICE
 from tests.conftest import ROOT, ended, export, in_a_row, touch
 from tests.edge.decide.test_knn import hostile
@@ -398,14 +399,14 @@ def test_a_stream_of_any_rate_has_the_same_events(early, tmp_path):
 
 
 EVERY = 24
-"""Of the 856 real grasps one of so many is decided."""
+"""Of the 856 real grasps one of so many is fitted; all are decided."""
 
 
 @pytest.mark.slow
 @needs_gcc
 def test_real_grasps_have_the_same_events(real, tmp_path):
-    grasps = [sdh2.grasp(file) for file in sdh2.files(real / "sdh2_grasps")[::EVERY]]
-    for i, grasp in enumerate(grasps):
+    grasps = [sdh2.grasp(file) for file in sdh2.files(real / "sdh2_grasps")]
+    for i, grasp in enumerate(grasps[::EVERY]):
         labels = {"object": f"{i % 4}"}
         trained = replace(grasp, meta={**grasp.meta, "labels": labels})
         save(tmp_path / "data" / f"{i:03d}.npz", trained)
@@ -546,7 +547,7 @@ def test_what_cannot_be_written_is_one_sentence_and_leaves_no_file(tmp_path):
 
 def test_every_float_has_a_literal():
     values = [np.inf, -np.inf, np.nan, np.float32(0.5)]
-    assert [c_code.literal(value) for value in values] == [
+    assert [literal(value) for value in values] == [
         "(double)INFINITY",
         "-(double)INFINITY",
         "(double)NAN",

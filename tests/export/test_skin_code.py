@@ -220,6 +220,8 @@ def frames_of(reader, wired, faults, frames, brown_outs=(), at_start=()):
     """What a reader makes of frames while faults last, and some frames after them."""
     wired.inject(at_start)
     rows = [[reader.start()]]
+    if rows == [[False]]:  # it is to be started again
+        return rows
     wired.inject(faults)
     due = wired.ticks()
     for k in range(frames):

@@ -39,7 +39,7 @@ static uint32_t older(uint32_t age, uint32_t by) { return age > NEVER - 1 - by ?
 
 /* The values of a chip's stages, and which are intact. */
 static void parse_ad7147(const uint8_t *bytes, uint16_t values[12], bool intact[12]) {
-  bool is_one = (bytes[24] << 8 | bytes[25]) >> 4 == EC_AD7147_IDENTITY;
+  bool is_one = (bytes[24] << 8 | bytes[25]) >> 4 == EC_IDENTITY;
   bool others = false;
   for (int i = 11; i >= 0; i--) {
     values[i] = (uint16_t)(bytes[2 * i] << 8 | bytes[2 * i + 1]);
@@ -77,7 +77,7 @@ static bool decode(const ec_chip *chip) {
       is_intact = intact[i];
     } else if (EC_HAS_MPR121 && chip->kind == EC_MPR121) {
       value = (uint16_t)(bytes[2 * i] | bytes[2 * i + 1] << 8);
-      is_intact = value != 0 && value < EC_MPR121_SATURATED;
+      is_intact = value != 0 && value < EC_SATURATED;
     } else if (EC_HAS_BLOCK) {
       value = unpacked(bytes + 2, i, chip->bits);
     }
@@ -170,7 +170,7 @@ static void follow_drift(uint32_t i) {
   int32_t rest = ec_calibration_now.rest[i] * SCALE;
   int32_t error = floored(ec_raw[i] * SCALE - baseline[i] + FOLLOW / 2, FOLLOW);
   int32_t moved = baseline[i] + clipped(error, -EC_DRIFT_STEP, EC_DRIFT_STEP);
-  baseline[i] = clipped(moved, rest - EC_DRIFT_LIMIT * SCALE, rest + EC_DRIFT_LIMIT * SCALE);
+  baseline[i] = clipped(moved, rest - EC_DRIFT_LIMIT_COUNTS * SCALE, rest + EC_DRIFT_LIMIT_COUNTS * SCALE);
 }
 
 static void assemble(uint64_t t) {
