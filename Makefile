@@ -274,7 +274,7 @@ constraints: $(VENV)/.upkeep
 
 # What is rare. `make check ONLY="risk kills"` goes on after one that fails; ARGS="--count 10" are
 # options of the program.
-CHECKS := accuracy faults flags fuzz hard-cases kills mutants remount risk scale shifts soak stopping \
+CHECKS := accuracy faults flags fuzz hard-cases kills mutants remount risk scale shifts soak \
   test-busy transfer
 .PHONY: $(CHECKS)
 ONLY ?= $(filter-out remount test-busy,$(CHECKS))

@@ -5,51 +5,31 @@ from __future__ import annotations
 
 import math
 import os
-import string
 import zlib
-from collections.abc import Iterable, Mapping, Sequence
-from contextlib import ExitStack
+from collections.abc import Iterable, Sequence
 from math import inf
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from edge.arrays import Array, Floats
+from edge.arrays import Array
 from edge.decide.doubts import GAP_S, PERIODS
 from edge.decide.early import stopping_rules
-from edge.decide.info import ModelInfo, StoppingRule
+from edge.decide.info import ModelInfo
 from edge.decide.model import Model
 from edge.elementary import log, logistic, sin
 from edge.errors import InputError
 from edge.features.cells import KERNEL_CELLS, Cells
-from edge.features.kernels import BIASES, CONVOLUTIONS, KernelTable, mixes
+from edge.features.kernels import BIASES, KernelTable, mixes
 from edge.features.names import Feature, feature_types, zones_of
 from edge.features.quantities import ALONE, OF_ZONES, force_floor, length_floor
 from edge.touch.layout import SkinLayout
-from edge.writing import write_whole
+from export.c_text import literal, write_rooms
+from export.costs import Costs
 from export.formula import Formula
-from export.image import NOWHERE, ROOMS, SIZES, TABLES, Image, Pools, record
+from export.image import ROOMS, SIZES, TABLES, Image, Pools, record
 
-CODE_BYTES = 28 * 1024
-"""Of all rooms, with small tables and the arithmetic of doubles, by gcc 12 with -O2 for a
-Cortex-M0+."""
-KERNEL_BYTES = 4608
-"""Of the code of kernels, and of the channels that each sums up."""
-COSTS = {
-    "task": (6800, 14000),
-    "convolution": (6600, 8900),
-    "root": (550, 670),
-    "row": (1036, 2270),
-    "product": (13.4, 56.6),
-    "trial": (430, 929),
-    "square": (30.4, 116),
-}
-"""Instructions of a Cortex-M4F and of a Cortex-M0+ for the parts of a decision, fitted
-to what QEMU counted: roots and logarithms of values, rows of projections, products of
-matrices, trials, and coordinates of these."""
-REST_OF_RAM = 2048 + 2100
-"""Of the stack, and of what does not depend on the model."""
 LONG_STEP_S = 0.95 * GAP_S / PERIODS
 """No usual step of at most this time makes a longer pause usual."""
 LARGEST = 2**63
@@ -92,37 +72,29 @@ def export(
     left_out = ""
     source = Source(model, error)
     limit = 1024 * (flash_kb or inf)
-    if source.flash > limit and error is not None:
+    if source.costs.flash > limit and error is not None:
         left_out += "; early decisions are left out to fit --flash"
         source = Source(model)
-    if source.flash > limit and model.info.novelty is not None:
+    if source.costs.flash > limit and model.info.novelty is not None:
         left_out += (
             "; novelty is left out to fit --flash: nothing is unusual or unknown, and "
             "confidence is that of a usual touch"
         )
         source = Source(model, doubts=False)
-    if source.flash > limit:
+    if source.costs.flash > limit:
         raise InputError(
-            f"{model.path}: takes {source.flash / 1024:.0f} kB of flash in C, above "
+            f"{model.path}: takes {source.costs.flash / 1024:.0f} kB of flash in C, above "
             "--flash; export fewer features or recordings"
         )
     source.write(Path(folder))
-    fast, slow = source.instructions() / 1e6
-    return (
-        f"{os.fspath(folder)}: {source.flash / 1024:.0f} kB of flash, "
-        f"{source.ram / 1024:.0f} kB of RAM, a decision in about {fast:.1f} million "
-        f"instructions of a Cortex-M4F ({fast / 0.064:.0f} ms at 64 MHz) or "
-        f"{slow:.1f} million of a Cortex-M0+ ({slow / 0.133:.0f} ms at 133 MHz){left_out}"
-    )
+    return f"{os.fspath(folder)}: {source.costs}{left_out}"
 
 
 class Source:
     """A model in C.
 
     Attributes:
-        flash: bytes of code and tables.
-        ram: bytes.
-        work: of a decision, how much there is of each of `COSTS`.
+        costs: what it takes.
         image: the model as data.
     """
 
@@ -144,52 +116,37 @@ class Source:
         self._info = model.info
         self._layout = model.info.layout
         self._types = feature_types(model.info.features)
-        self._doubts = doubts and model.info.novelty is not None
         count = len(model.decision_points_s)
-        self._points = range(0 if error is not None else count - 1, count)
+        points = range(0 if error is not None else count - 1, count)
         self._zones = zones_of(self._types)
         self._pools = Pools()
-        self._formula = Formula(model, self._points, self._pools)
-        self.work: dict[str, float] = {"task": len(model.info.tasks)}
+        rules = {} if error is None else stopping_rules(model, error)
+        has_novelty = doubts and model.info.novelty is not None
+        formula = Formula(model, points, self._pools, rules, has_novelty)
         self._tables: dict[str, Any] = {
-            "projections": self._formula.projections,
-            "windows_s": [model.decision_points_s[i] for i in self._points],
+            **formula.tables,
+            "windows_s": [model.decision_points_s[i] for i in points],
         }
         self._sizes: dict[str, int] = {
-            "points": len(self._points),
-            "tasks": len(model.info.tasks),
-            "spaces": self._formula.spaces,
+            **formula.sizes,
+            "points": len(points),
             "features": len(self._types),
             "width": self._info.width,
             "joints": self._info.joints,
             "long_steps": int(model.info.window_s / LONG_STEP_S) + 2,
-            "has_novelty": self._doubts,
         }
         self._features()
         self._skin()
         self._geometry()
-        self._tasks({} if error is None else stopping_rules(model, error))
-        if self._doubts:
-            self._limits()
-        self._sizes["components"] = self._formula.components
-        for kind, amount in self._formula.work.items():
-            self._add_work(kind, amount)
         header = {
             "program": program(self._layout),
-            "trials": self._formula.trials,
-            "numbers": self._numbers(model, error is not None),
+            "trials": formula.trials,
+            "numbers": self._numbers(model, formula, error is not None),
             "sizes": record("ec_sizes", **self._sizes),
         }
         empty = dict.fromkeys(TABLES, ())
         self.image = Image(header, empty | self._tables | self._pools.tables())
-        kernels = KERNEL_BYTES * (self._sizes["channels"] > 0)
-        self.flash = CODE_BYTES + kernels + self.image.size
-        self.ram = self._ram()
-
-    def instructions(self) -> Floats:
-        """(2,) about how many a decision takes on each processor of `COSTS`."""
-        costs = np.array([COSTS[kind] for kind in self.work])
-        return np.asarray(np.array([*self.work.values()]) @ costs)
+        self.costs = Costs(self.image, self._layout.alive.size)
 
     def write(self, folder: Path) -> None:
         """Write all files, whole or not at all."""
@@ -200,7 +157,7 @@ class Source:
             **quantities_in_c(),
             **{name: literal(getattr(self._layout, name)) for name in OF_PROGRAM},
             "program": str(program(self._layout)),
-            "ram": str(self.ram),
+            "ram": str(self.costs.ram),
             "most": literal(sizes.values()),
             "sizes": "\n".join(
                 f"#define EC_MOST_{name.upper()} {int(n)}" for name, n in sizes.items()
@@ -213,7 +170,7 @@ class Source:
         }
         write_rooms(ROOMS, folder, values, {"model.bin": image.data()})
 
-    def _numbers(self, model: Model, early: bool) -> Array:
+    def _numbers(self, model: Model, formula: Formula, early: bool) -> Array:
         layout = self._layout
         info = self._info
         values = {name: getattr(layout, name) or 0 for name in OF_LAYOUT}
@@ -235,9 +192,9 @@ class Source:
             repeats=info.repeats,
             early=early,
             calibrated=info.novelty is not None,
-            naming=self._naming(),
+            naming=formula.naming,
             text=self._pools.text(info.name or ""),
-            checksum=checksum(model) if self._formula.spaces else 0,
+            checksum=checksum(model) if formula.trials else 0,
         )
 
     def _features(self) -> None:
@@ -249,17 +206,12 @@ class Source:
         for feature, width in zip(self._types, self._info.widths, strict=True):
             course = self._course(feature, width)
             samples, count, *_ = course
-            if feature.quantity.kernels:
-                self._add_work("convolution", CONVOLUTIONS)
-            elif course not in courses:
+            if not feature.quantity.kernels and course not in courses:
                 courses[course] = place
                 place += samples * count
             if feature.summary not in ("", "rate"):
                 together = count if "relative" in feature.transforms else 1
                 summed = max(summed, samples * together)
-            roots = {"log", "sqrt"}.intersection(feature.transforms)
-            if not feature.quantity.kernels:
-                self._add_work("root", samples * count * len(roots))
             number = [*courses].index(course) if course in courses else 0
             features.append(_feature(feature, self._layout, number))
         names = ("samples", "rows", "zone", "quantity")
@@ -285,9 +237,6 @@ class Source:
             0 if quantity.zone else self._zones.index(feature.zone),
             codes().index(quantity.code.replace("CHANGE", "ANGLE")),
         )
-
-    def _add_work(self, kind: str, amount: float) -> None:
-        self.work[kind] = self.work.get(kind, 0) + amount
 
     def _kernels(self, table: KernelTable) -> Array:
         """The `ec_kernels` of a table, which may be empty."""
@@ -357,107 +306,6 @@ class Source:
             for span, still in list(zip(ranges, still_s, strict=False))[:joints]
         ]
 
-    def _tasks(self, rules: Mapping[str, StoppingRule | None]) -> None:
-        """The tasks, their labels and their calibration."""
-        tasks = self._info.tasks
-        names = list(tasks)
-        self._tables["tasks"] = [self._task(name, rules.get(name)) for name in tasks]
-        # Of a space the rows with most components come first: others are parts of them.
-        wide = sorted(tasks, key=lambda name: -tasks[name].components)
-        places = {
-            (point, name): self._formula.place(name, point, self._curve(name, point))
-            for point in self._points
-            for name in wide
-        }
-        self._tables["places"] = [
-            places[point, name] for point in self._points for name in names
-        ]
-        self._sizes |= {
-            "labels": max(len(task.labels) for task in tasks.values()),
-            "neighbours": max(task.k for task in tasks.values()),
-            "nearest": self._formula.nearest,
-        }
-
-    def _task(self, name: str, rule: StoppingRule | None) -> Array:
-        """The `ec_task` of a task, with its rule for early decisions, if any."""
-        task = self._info.tasks[name]
-        names = list(self._info.tasks)
-        indices = [self._pools.add("words", of) for of in task.factors.values()]
-        factors = [names.index(factor) for factor in task.factors]
-        made = record(
-            "ec_task",
-            text=self._pools.text(name, *task.labels),
-            indices=indices or NOWHERE,
-            factors=factors or 0,
-            labels=len(task.labels),
-            k=task.k,
-            **self._formula.task(name),
-        )
-        stopping = self._info.stopping.get(name)
-        if stopping is not None:
-            made["rule_curve"] = stopping.slope, stopping.intercept, stopping.doubt
-        if rule:
-            made["rule_confidence"] = rule.confidence
-            made["rule_last"] = rule.last
-            made["has_rule"] = True
-        return made
-
-    def _curve(self, task: str, point: int) -> tuple[float, float, float]:
-        """The curve of a task's confidence at a decision point."""
-        of = self._info.stopping.get(task)
-        if of is None:
-            return 0.0, 0.0, 0.0
-        return of.slopes[point], of.intercepts[point], of.doubts[point]
-
-    def _naming(self) -> int:
-        """The task that names things; `NOWHERE` where nothing is unknown."""
-        for i, name in enumerate(self._info.tasks if self._doubts else ()):
-            stopping = self._info.stopping.get(name)
-            if stopping is not None and stopping.remoteness is not None:
-                return i
-        return NOWHERE
-
-    def _limits(self) -> None:
-        """The scores of doubt, and their limits at the decision points."""
-        info = self._info
-        assert info.novelty is not None
-        naming = self._naming()
-        far = None
-        if naming != NOWHERE:
-            far = info.stopping[[*info.tasks][naming]].remoteness
-        doubts = []
-        for point in self._points:
-            limits = {
-                "typical": info.novelty.typical[point],
-                "novel": info.novelty.limits[point],
-            }
-            if far is not None:
-                limits["remote"] = far.limits[point]
-                limits["middle"] = far.middles[point]
-                limits["slope"] = far.slopes[point]
-            doubts.append(self._formula.doubt(point, limits))
-        self._formula.weigh_doubt(doubts[-1])
-        self._tables["doubts"] = doubts
-
-    def _ram(self) -> int:
-        """Bytes of RAM."""
-        size = self._sizes
-        zones = max(size["zones"], 1)
-        unsure = 2 * size["zones"] + 3 + size["joints"]
-        row = 40 + 8 * max(size["joints"], 1) + 121 * zones + 8 * unsure
-        row += 4 * max(size["cells"], 1) + 4 * max(size["kernel_cells"], 1)
-        answer = 10 * size["labels"] + 10 * size["neighbours"] + 8
-        return (
-            4 * row
-            + 48 * unsure
-            + 9 * self._layout.alive.size
-            + size["points"] * (8 * size["values"] + 240 * size["channels"])
-            + 8 * (size["width"] + size["summed"] + size["nearest"])
-            + size["tasks"] * (answer + 8 * size["labels"] + 64)
-            + (4 * size["spaces"] + 12) * size["components"]
-            + REST_OF_RAM
-        )
-
 
 def _feature(feature: Feature, layout: SkinLayout, course: int) -> Array:
     """The `ec_feature` of a feature that is made of a course."""
@@ -483,25 +331,6 @@ def program(layout: SkinLayout) -> int:
     return zlib.crc32(repr((shape, quantities_in_c())).encode())
 
 
-def write_rooms(
-    rooms: Path,
-    folder: Path,
-    values: Mapping[str, str],
-    more: Mapping[str, bytes] | None = None,
-) -> None:
-    """Write all files of C of a folder with these values, and more, whole or not at
-    all."""
-    contents = {
-        room.name: string.Template(room.read_text()).substitute(values).encode()
-        for room in rooms.glob("*.[ch]")
-    }
-    with ExitStack() as files:
-        for name, data in (contents | dict(more or {})).items():
-            file = files.enter_context(write_whole(folder / name))
-            file.write(data)
-            file.flush()
-
-
 def checksum(model: Model) -> int:
     """What `ec_selftest` in `export/c/decide.c` compares: FNV-1a of elementary functions
     and of the outputs for features that are all `PROBE`, at the full window."""
@@ -516,27 +345,6 @@ def checksum(model: Model) -> int:
     for bits in np.concatenate(parts).astype(np.float64).view(np.uint64).tolist():
         total = (total ^ bits) * 1099511628211 % 2**64
     return total
-
-
-def literal(value: object) -> str:
-    """A value in C: hexadecimal floats hold every bit."""
-    if isinstance(value, str):
-        return value
-    if isinstance(value, Iterable):
-        return f"{{{', '.join(map(literal, value)) or '0'}}}"
-    if not isinstance(value, float | np.floating):
-        number = int(value)  # type: ignore[call-overload]
-        return f"{number}u" if number > 2**31 else str(number)
-    if np.isnan(value):
-        return "(double)NAN"
-    if np.isinf(value):
-        return f"{'-' if value < 0.0 else ''}(double)INFINITY"
-    return float(value).hex()
-
-
-def array(kind: str, values: Iterable[object]) -> str:
-    """A constant array without a name."""
-    return f"(const {kind}[]){literal(values)}"
 
 
 def codes() -> list[str]:

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
 from edge.arrays import Array, Floats
+from edge.decide.info import StoppingRule
 from edge.decide.knn import Constants
 from edge.decide.model import Model
 from export.image import NOWHERE, Pools, record
@@ -15,65 +16,85 @@ from export.image import NOWHERE, Pools, record
 FRACTION_BITS = 8
 """Of the squared weights of coordinates: `EC_FRACTION_BITS`."""
 NO_LABEL = 65535
-WORK = ("row", "product", "trial", "square", "root")
 
 
 class Formula:
     """What a decision is computed by.
 
     Attributes:
-        spaces: how many there are.
-        trials: likewise.
-        components: the most of a space.
-        nearest: trials that count for the distances to all labels of a task, at most.
-        projections: the `ec_projection` of each point and space.
-        work: {kind: how much of it a decision takes}; `WORK` are the kinds.
+        tables: {name: its records}: projections, tasks, places and doubts.
+        sizes: fields of the `ec_sizes`.
+        trials: how many there are.
+        naming: the task that names things; `NOWHERE` where nothing is unknown.
     """
 
-    def __init__(self, model: Model, points: Sequence[int], pools: Pools) -> None:
+    def __init__(
+        self,
+        model: Model,
+        points: Sequence[int],
+        pools: Pools,
+        rules: Mapping[str, StoppingRule | None],
+        has_novelty: bool,
+    ) -> None:
         """Read the constants.
 
         Args:
             model: whose they are.
             points: the decision points that are kept.
             pools: take the numbers.
+            rules: of the tasks, for early decisions.
+            has_novelty: whether novelty and remoteness are kept.
 
         Raises:
             InputError: C cannot take a number.
         """
         arrays = model.contents.constants
+        self._info = model.info
         self._points = {point: Constants(arrays, point) for point in points}
-        at = self._points[points[-1]]
-        self._width = model.info.width
+        self._last = at = self._points[points[-1]]
         self._pools = pools
-        tasks = model.info.tasks
-        self.spaces = 1 + max(map(at.space, tasks))
+        tasks = self._info.tasks
+        self._spaces = 1 + max(map(at.space, tasks))
         self.trials = max(len(at.numbers(f"labels of {t}", 1)) for t in tasks)
-        self.nearest = 0
-        self.work = dict.fromkeys(WORK, 0)
-        self.projections = [
+        projections = [
             made for point in points for made in self._projections(self._points[point])
         ]
-        widths = [len(at.numbers(f"coordinates of {task}", 2)) for task in tasks]
-        self.components = max(
-            widths + [int(p["components"][0]) for p in self.projections]
-        )
-        for of_space in self.projections[-self.spaces :]:
-            self._weigh(of_space)
-
-    def _weigh(self, projection: Array) -> None:
-        count = int(projection["count"][0])
-        self.work["row"] += count
-        self.work["product"] += count * int(projection["components"][0])
+        of_tasks = [self._task(name, rules.get(name)) for name in tasks]
+        # Of a space the rows with most components come first: others are parts of them.
+        wide = sorted(tasks, key=lambda name: -tasks[name].components)
+        places = {
+            (point, name): self._place(name, point) for point in points for name in wide
+        }
+        self.naming = self._naming() if has_novelty else NOWHERE
+        doubts = [self._doubt(point) for point in points] if has_novelty else []
+        self.tables = {
+            "projections": projections,
+            "tasks": of_tasks,
+            "places": [places[point, name] for point in points for name in tasks],
+            "doubts": doubts,
+        }
+        near = [f"counts of {name}" for name in tasks if f"scales of {name}" in at]
+        projected = [*projections, *(doubt["projection"] for doubt in doubts)]
+        widths = [len(at.numbers(f"coordinates of {name}", 2)) for name in tasks]
+        widths += [int(projection["components"][0]) for projection in projected]
+        self.sizes = {
+            "tasks": len(tasks),
+            "labels": max(len(task.labels) for task in tasks.values()),
+            "neighbours": max(task.k for task in tasks.values()),
+            "nearest": max((int(at.numbers(n, 1).sum()) for n in near), default=0),
+            "components": max(widths),
+            "spaces": self._spaces,
+            "has_novelty": has_novelty,
+        }
 
     def _projections(self, at: Constants) -> list[Array]:
         """The `ec_projection` of each space at a decision point."""
         means: list[tuple[Floats, Array]] = []
         places = []
-        for space in range(self.spaces):
+        for space in range(self._spaces):
             first, name = at.projection(space)
-            wide = np.zeros(self._width)
-            mine = np.zeros(self._width, bool)
+            wide = np.zeros(self._info.width)
+            mine = np.zeros(self._info.width, bool)
             columns: Any = slice(None)
             if f"columns {name}" in at:
                 columns = at.numbers(f"columns {name}", 1)
@@ -107,8 +128,32 @@ class Formula:
             components=used,
         )
 
-    def doubt(self, point: int, limits: dict[str, float]) -> Array:
-        """The `ec_doubt` of a decision point, with the limits of the scores."""
+    def _naming(self) -> int:
+        """The task that names things; `NOWHERE` where nothing is unknown."""
+        for i, name in enumerate(self._info.tasks):
+            stopping = self._info.stopping.get(name)
+            if stopping is not None and stopping.remoteness is not None:
+                return i
+        return NOWHERE
+
+    def _limits(self, point: int) -> dict[str, float]:
+        """The limits of the scores of doubt at a decision point."""
+        info = self._info
+        assert info.novelty is not None
+        limits = {
+            "typical": info.novelty.typical[point],
+            "novel": info.novelty.limits[point],
+        }
+        if self.naming != NOWHERE:
+            far = info.stopping[[*info.tasks][self.naming]].remoteness
+            assert far is not None
+            limits["remote"] = far.limits[point]
+            limits["middle"] = far.middles[point]
+            limits["slope"] = far.slopes[point]
+        return limits
+
+    def _doubt(self, point: int) -> Array:
+        """The `ec_doubt` of a decision point."""
         pools = self._pools
         at = self._points[point]
         weights = at.numbers("novelty weights", 2)
@@ -127,7 +172,6 @@ class Formula:
         whitening, fine = pools.matrix(at.numbers("novelty whitening", 2))
         rows, _ = pools.matrix(at.numbers("novelty coordinates", 2) / -2.0)
         squares = at.numbers("remoteness weights", 1) ** 2
-        self.components = max(self.components, weights.shape[1])
         return record(
             "ec_doubt",
             projection=projection,
@@ -138,19 +182,11 @@ class Formula:
             whitening=whitening,
             rows=rows,
             weights=pools.add("words", squares * 2.0**FRACTION_BITS),
-            **limits,
+            **self._limits(point),
         )
 
-    def weigh_doubt(self, doubt: Array) -> None:
-        """Count the work of the scores."""
-        self._weigh(doubt["projection"])
-        components = int(doubt["projection"]["components"][0])
-        self.work["product"] += components**2
-        self.work["trial"] += 2 * self.trials
-        self.work["square"] += 2 * self.trials * components
-
-    def place(self, task: str, point: int, curve: Sequence[float]) -> Array:
-        """The `ec_place` of a task at a decision point, with its curve of confidence."""
+    def _place(self, task: str, point: int) -> Array:
+        """The `ec_place` of a task at a decision point."""
         at = self._points[point]
         coordinates = at.numbers(f"coordinates of {task}", 2) / -2.0
         if f"mask of {task}" in at:
@@ -161,30 +197,49 @@ class Formula:
             "ec_place",
             unit=at.numbers("units", 1)[at.space(task)],
             scale=at.numbers(scales) if scales in at else 0.0,
-            curve=curve,
+            curve=self._curve(task, point),
             rows=rows,
             components=len(coordinates),
         )
 
-    def task(self, task: str) -> dict[str, Any]:
-        """Fields of an `ec_task`."""
-        at = [*self._points.values()][-1]
-        labels = at.numbers(f"labels of {task}", 1)
+    def _curve(self, task: str, point: int) -> tuple[float, float, float]:
+        """The curve of a task's confidence at a decision point."""
+        of = self._info.stopping.get(task)
+        if of is None:
+            return 0.0, 0.0, 0.0
+        return of.slopes[point], of.intercepts[point], of.doubts[point]
+
+    def _task(self, name: str, rule: StoppingRule | None) -> Array:
+        """The `ec_task` of a task, with its rule for early decisions, if any."""
+        task = self._info.tasks[name]
+        names = list(self._info.tasks)
+        at = self._last
         add = self._pools.add
+        factors = [names.index(factor) for factor in task.factors]
+        indices = [add("words", of) for of in task.factors.values()]
+        labels = at.numbers(f"labels of {name}", 1)
         counts = NOWHERE
-        if f"scales of {task}" in at:
-            of_labels = at.numbers(f"counts of {task}", 1)
-            counts = add("words", of_labels)
-            self.nearest = max(self.nearest, int(of_labels.sum()))
-            self.work["root"] += int(of_labels.sum())
-        width = len(at.numbers(f"coordinates of {task}", 2))
-        self.work["trial"] += len(labels)
-        self.work["square"] += len(labels) * width
-        return {
-            "trials": add("words", np.where(labels < 0, NO_LABEL, labels)),
-            "counts": counts,
-            "space": at.space(task),
-        }
+        if f"scales of {name}" in at:
+            counts = add("words", at.numbers(f"counts of {name}", 1))
+        made = record(
+            "ec_task",
+            text=self._pools.text(name, *task.labels),
+            trials=add("words", np.where(labels < 0, NO_LABEL, labels)),
+            counts=counts,
+            indices=indices or NOWHERE,
+            labels=len(task.labels),
+            k=task.k,
+            space=at.space(name),
+            factors=factors or 0,
+        )
+        stopping = self._info.stopping.get(name)
+        if stopping is not None:
+            made["rule_curve"] = stopping.slope, stopping.intercept, stopping.doubt
+        if rule:
+            made["rule_confidence"] = rule.confidence
+            made["rule_last"] = rule.last
+            made["has_rule"] = True
+        return made
 
 
 def _shared(tables: list[tuple[Floats, Array]], wide: Floats, mine: Array) -> int:

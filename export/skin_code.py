@@ -21,7 +21,7 @@ from edge.wire.chips.kinds import KINDS
 from edge.wire.skin import bus_reader, calibration, decoder, lone
 from edge.wire.skin.file import Signal, SkinFile
 from edge.writing import write_whole
-from export.c_code import array, literal, write_rooms
+from export.c_text import array, literal, write_rooms
 from export.image import ROOMS
 
 HZ = 1_000_000
@@ -44,11 +44,14 @@ NUMBERS: tuple[tuple[Any, tuple[str, ...]], ...] = (
     (retrying, ("MOST_CREDIT", "RESTS")),
     (bus_reader, ("SET_UP_AFTER", "SET_UP_EVERY", "OLDEST_FRAMES")),
     (lone, ("FEWEST_NEIGHBOURS",)),
-    (ad7147, ("IDENTIFIED_EVERY",)),
+    (ad7147, ("IDENTIFIED_EVERY", "IDENTITY")),
+    (mpr121, ("SATURATED",)),
     (calibration, ("FEWEST_FRAMES", "NOISY", "NOISY_COUNTS")),
     (decoder, ("COARSE",)),
 )
-"""Constants that have the same names in C."""
+"""Constants that have the same names in C, as have these keys of a skin file."""
+OF_SIGNAL = ("dead_band_sigma", "drift_limit_counts")
+OF_READING = ("verify_mux", "recheck_frames", "stuck_frames")
 
 
 def export(
@@ -93,9 +96,8 @@ def _numbers(file: SkinFile, hz: int) -> dict[str, Any]:
     period = round(hz / rate_hz)
     scale = 1 << decoder.SCALE_BITS
     answers = [len(step.answer) for chip in file.chips for step in steps(chip.script)]
-    numbers = {
-        name: getattr(module, name) for module, names in NUMBERS for name in names
-    }
+    named = (*NUMBERS, (signal, OF_SIGNAL), (file.reading, OF_READING))
+    numbers = {name: getattr(of, name) for of, names in named for name in names}
     kinds = {chip.kind.name for chip in file.chips}
     numbers |= {f"has_{name}": name in kinds for name in KINDS}
     numbers |= {name: getattr(file.layout, key) for key, name in SIZES.items()}
@@ -112,18 +114,11 @@ def _numbers(file: SkinFile, hz: int) -> dict[str, Any]:
             "chips": len(file.chips),
             "bytes": sum(chip.traits.frame_bytes for chip in file.chips),
             "most_answer": max(answers),
-            "verify_mux": file.reading.verify_mux,
-            "recheck_frames": file.reading.recheck_frames,
-            "stuck_frames": file.reading.stuck_frames,
             "frames_of_conversion": 1 + math.ceil(decoder.CONVERSION_S * rate_hz),
             "chance": math.exp(decoder.LOG_CHANCE),
             "repeats_of_1": 0.5 / math.sqrt(math.pi),
             "standing_out": int(calibration.SPREADS),
-            "ad7147_identity": ad7147.IDENTITY,
-            "mpr121_saturated": mpr121.SATURATED,
-            "dead_band_sigma": signal.dead_band_sigma,
             "dead_band_counts": max(1, signal.dead_band_counts),
-            "drift_limit": signal.drift_limit_counts,
             "drift_step": math.ceil(signal.drift_counts_per_s / rate_hz * scale),
             "reach": signal.saturation_counts + signal.drift_limit_counts,
         }
@@ -167,8 +162,7 @@ def _tables(file: SkinFile, hz: int) -> dict[str, Any]:
     return {
         "retries": [0, *(error.retries for error in OUTCOMES)],
         "first_chips": ends,
-        "alive": file.layout.alive.ravel(),
-        "served": taxels.served,
+        "working": taxels.served,
         "signs": taxels.sign,
         "calibration": _calibration(file),
         "scripts": scripts,

@@ -33,8 +33,8 @@ from tests.conftest import ROOT
 from train.__main__ import main
 from train.data.feature_sets import SETS
 from train.importers import forms
-from train.importers.table import Table as Columns
-from train.report.section import Section, Table
+from train.importers.table import Table
+from train.report.section import ReportTable, Section
 from train.study import run as study
 
 TABLE = re.findall(
@@ -114,7 +114,7 @@ class Toy:
     def tables(file, options):
         rows = [line.split() for line in file.lines[1:] if line]
         data = {"t": [float(t) for t, _ in rows], "s1": [len(word) for _, word in rows]}
-        yield Columns(str(file.path), DataFrame(data))
+        yield Table(str(file.path), DataFrame(data))
 
 
 def test_a_form_of_tables_is_an_entry_of_the_list(monkeypatch, tmp_path):
@@ -194,7 +194,9 @@ def test_a_section_is_a_function_in_the_list(recordings, monkeypatch, tmp_path):
     def section(context):
         classes = {task: len(set(y)) for task, y in context.labels.items()}
         rows = [{"task": task, "classes": n} for task, n in classes.items()]
-        return Section("A toy", ["As it stands."], [Table("toy", "Classes", rows)])
+        return Section(
+            "A toy", ["As it stands."], [ReportTable("toy", "Classes", rows)]
+        )
 
     monkeypatch.setattr(study, "ANALYSES", (section,))
     monkeypatch.setattr(study, "FEWEST", 16)

@@ -67,8 +67,8 @@ def test_the_two_evenings_mend_a_mistake(tmp_path):
     *before, after = objects(ran.stdout)[:6]
     assert "pillow" not in before
     assert after == "pillow"
-    kept = [json.loads(x) for x in ran.stdout.splitlines() if '"kinds": ["uns' in x]
-    assert len({line["file"] for line in kept if "unlabelled" in line["kinds"]}) == 5
+    touches = [json.loads(x) for x in ran.stdout.splitlines() if '"kinds": ["uns' in x]
+    assert len({line["file"] for line in touches if "unlabelled" in line["kinds"]}) == 5
     assert ran.stderr.count("record a third object") == 2
 
 

@@ -12,7 +12,6 @@ from edge.errors import EdgeError
 from tests.checks import __main__ as checks
 from tests.checks import mutants
 from tests.checks.bench import tables
-from tests.checks.bench.scale import rows_of
 from tests.checks.hard_cases import __main__ as hard_cases
 from tests.checks.hard_cases import elsewhere
 from tests.conftest import ROOT
@@ -29,15 +28,6 @@ from tests.conftest import ROOT
 def test_options_that_would_measure_nothing_are_refused(measure, words, sentence):
     with pytest.raises(EdgeError, match=sentence):
         measure(*words)
-
-
-def test_what_grows_faster_than_its_bound_is_told():
-    few = {"trials": 100, "processor, s": 10.0, "memory, MB": 400.0, "model, kB": 50.0}
-    many = {**few, "trials": 1600, "processor, s": 80.0}
-    rows, within = rows_of([few, many])
-    assert within
-    assert rows[1]["processor, times"] == rows[1]["processor, at most"] == "8.0"
-    assert not rows_of([few, {**many, "memory, MB": 1601.0}])[1]
 
 
 def test_a_word_is_exchanged_where_it_is_code(monkeypatch, tmp_path):
@@ -103,5 +93,5 @@ def test_options_of_a_check_reach_its_last_step_and_a_failed_step_ends_it(monkey
     assert checks.main(["--out", "o", "shifts", "--model", "m", "--help"]) == 1
     assert [step[0] for step in steps[:2]] == ["train", "export"]
     assert steps[2][-3:] == ("--model", "m", "--help")
-    assert checks.main(["--data", "a", "b", "--", "stopping"]) == 1
-    assert steps[3:] == [("tests.checks.bench.stopping", "--data", "a", "b")]
+    assert checks.main(["--data", "a", "b", "--", "remount"]) == 1
+    assert steps[3:] == [("tests.checks.remount", "--recordings", "a", "b")]

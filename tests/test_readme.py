@@ -55,8 +55,8 @@ def test_a_command_of_any_page_has_arguments_that_its_program_knows(
 
 @pytest.mark.parametrize("command", MAKE)
 def test_a_make_command_says_what_it_would_do(command):
-    written = re.sub("[][…]", "", command)
-    process = ended(*shlex.split(written), "--dry-run")
+    plain = re.sub("[][…]", "", command)
+    process = ended(*shlex.split(plain), "--dry-run")
     assert process.returncode == 0, process.stderr
     assert "python" in process.stdout
 

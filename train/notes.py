@@ -92,9 +92,9 @@ def _outliers(fitted: Fitted) -> Iterator[str]:
         if "kernels" not in name and not measures.feature(name).quantity.wide
     ]
     if names:
-        used = fitted.dataset.of(names)
-        X = used.features(fitted.window_s, fitted.samples)
-        yield from outliers.by_features(used, X, used.widths(fitted.samples))
+        dataset = fitted.dataset.of(names)
+        X = dataset.features(fitted.window_s, fitted.samples)
+        yield from outliers.by_features(dataset, X, dataset.widths(fitted.samples))
 
 
 def _task_warnings(fitted: Fitted, task: str) -> Iterator[str]:

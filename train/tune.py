@@ -104,14 +104,14 @@ class Loaded:
 
 def features_tried(recordings: Recordings, options: FitOptions) -> tuple[str, ...]:
     """The features of all candidates for recordings."""
-    tried = candidates(
+    settings = candidates(
         {},
         options,
         joints=recordings.mostly_have("joints"),
         shear=recordings.mostly_have("shear"),
         drawn=kinds_of(recordings.recordings) is not None,
     )
-    return features_of(tried)
+    return features_of(settings)
 
 
 def choosing_of(dataset: DataSet, y: Labels, options: FitOptions) -> Choosing:
@@ -127,7 +127,7 @@ def choosing_of(dataset: DataSet, y: Labels, options: FitOptions) -> Choosing:
             f"k must be 1 to {most}, the trials that remain of "
             f"{len(divisions.folds)} where some are held out, not {options.k}"
         )
-    tried = candidates(
+    settings = candidates(
         y,
         options,
         joints=dataset.joints > 0,
@@ -137,7 +137,7 @@ def choosing_of(dataset: DataSet, y: Labels, options: FitOptions) -> Choosing:
     return Choosing(
         dataset,
         y,
-        tried,
+        settings,
         divisions,
         options.samples,
         options.processes,

@@ -14,8 +14,8 @@ def main(task: str, out: str) -> None:
     """Draw the positions of a task's decisions on stdin from above and from the side."""
     places = defaultdict(list)
     for event in map(json.loads, sys.stdin):
-        if event["event"] == "decision" and event["task"] == task and event["place"]:
-            places[str(event["label"])].append(event["place"])
+        if event["event"] == "decision" and event["task"] == task and event["position"]:
+            places[str(event["label"])].append(event["position"])
     figure = Figure(figsize=(11, 5), layout="constrained")
     axes = figure.subplots(1, 2)
     for axis, (across, up) in zip(axes, ("xy", "xz"), strict=True):

@@ -9,7 +9,7 @@ import numpy as np
 
 from edge.decide.events import Decided
 from edge.errors import InputError
-from edge.record.labels import CATEGORY, Labels, Standing, Table
+from edge.record.labels import CATEGORY, Labels, LabelTable, Standing
 from edge.record.recording import Recording
 
 UNKNOWN = "unknown"
@@ -134,7 +134,7 @@ class Touch(NamedTuple):
 
 
 def touches(
-    metas: Mapping[Path, Mapping[str, Any]], table_of: Callable[[Path], Table]
+    metas: Mapping[Path, Mapping[str, Any]], table_of: Callable[[Path], LabelTable]
 ) -> list[Touch]:
     """How recordings stand.
 

@@ -47,7 +47,7 @@ def chip_event(status: ChipStatus, **more: Any) -> dict[str, Any]:
         "event": "chip",
         **more,
         "bus": status.bus,
-        "place": status.spec.route,
+        "route": status.spec.route,
         "state": status.state,
     }
     if status.error:

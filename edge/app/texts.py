@@ -80,7 +80,7 @@ def _release(line: Line) -> str:
 
 def _chip(line: Line) -> str:
     error = f": {line['error']}" if line.get("error") else ""
-    return _at(line["t"], f"{line['bus']}, {line['place']} is {line['state']}{error}")
+    return _at(line["t"], f"{line['bus']}, {line['route']} is {line['state']}{error}")
 
 
 def _bus(line: Line) -> str:

@@ -97,7 +97,7 @@ class Decided:
         """The event as a JSON object."""
         line = {**_line("decision", self), "window_s": self.window_s}
         if self.contact is not None:
-            line["place"] = self.position and list(self.position)
+            line["position"] = self.position and list(self.position)
         for key in ("task", "label", "confidence", "latency_ms"):
             line[key] = getattr(self, key)
         for key in ("strongest", "error", "stopped_by", "unusual", "model"):

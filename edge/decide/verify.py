@@ -43,7 +43,7 @@ from edge.touch.layout import SkinLayout
 from edge.touch.track import first_contact
 
 Line = tuple[str, Array, Array]
-"""A quantity to compare: name, seen, expected."""
+"""A quantity to compare: name, computed values, expected ones."""
 
 
 @dataclass(frozen=True)
@@ -54,14 +54,14 @@ class Check:
         name: the quantity.
         rows: how many rows were compared.
         row: the first that differs, or None where all rows are equal.
-        seen: the value there.
+        value: the computed value there.
         expected: the golden value there.
     """
 
     name: str
     rows: int
     row: int | None = None
-    seen: str = ""
+    value: str = ""
     expected: str = ""
 
     @property

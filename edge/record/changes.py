@@ -13,7 +13,15 @@ from typing import NamedTuple
 
 from edge.errors import InputError, printable
 from edge.files import parsing, read_bytes
-from edge.record.labels import FILE, LEFT_OUT, TABLE, Row, Standing, Table, read_table
+from edge.record.labels import (
+    FILE,
+    LEFT_OUT,
+    TABLE,
+    LabelTable,
+    Row,
+    Standing,
+    read_table,
+)
 from edge.record.recording import read_meta
 from edge.writing import alone, write_whole
 
@@ -49,7 +57,7 @@ def now() -> str:
 
 def change(
     folder: Path, changes: Mapping[str, Change], when: str, command: str
-) -> Table:
+) -> LabelTable:
     """Give recordings of a folder other labels, or leave them out; the new table.
 
     Args:
@@ -92,7 +100,7 @@ def _newer(folder: Path, standing: Standing) -> str:
     )
 
 
-def _filled(table: Table, after: Mapping[str, Standing]) -> dict[str, Standing]:
+def _filled(table: LabelTable, after: Mapping[str, Standing]) -> dict[str, Standing]:
     """How the recordings of a table stand, with a label for each column that it gets."""
     tasks = {task for standing in after.values() for task in standing.labels}
     filled = {}

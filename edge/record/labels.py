@@ -115,7 +115,7 @@ class Row(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Table:
+class LabelTable:
     """The labels that stand beside recordings.
 
     Attributes:
@@ -170,7 +170,7 @@ class Table:
         return text.getvalue().encode("utf-8-sig")
 
 
-def read_table(folder: Path, column: str = FILE) -> Table:
+def read_table(folder: Path, column: str = FILE) -> LabelTable:
     """The table of a folder, UTF-8 as a spreadsheet writes it; an empty one where the
     folder has none.
 
@@ -183,7 +183,7 @@ def read_table(folder: Path, column: str = FILE) -> Table:
     """
     path = folder / TABLE
     if not os.path.lexists(path):
-        return Table(path)
+        return LabelTable(path)
     contents = read_bytes(path)
     kind = "a table of labels"
     with parsing(str(path), kind, "; save it as CSV in UTF-8, or undo the change"):
@@ -195,7 +195,7 @@ def read_table(folder: Path, column: str = FILE) -> Table:
         )
         cells = [(lines.line_num, [cell.strip() for cell in line]) for line in lines]
     header = cells[0][1] if cells else []
-    while header[1:] and not header[-1]:  # a spreadsheet may end lines with empty cells
+    while header and not header[-1]:  # a spreadsheet may end lines with empty cells
         header.pop()
     with about(f"{path}, line 1"):
         _check_header(header, column)
@@ -209,7 +209,7 @@ def read_table(folder: Path, column: str = FILE) -> Table:
                         f"{file} has line {rows[file].line} too; remove one of them"
                     )
             rows[file] = row
-    return Table(path, contents, delimiter, rows)
+    return LabelTable(path, contents, delimiter, rows)
 
 
 def _is_reserved(name: str) -> bool:

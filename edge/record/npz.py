@@ -29,7 +29,7 @@ def load_arrays(
     path: str | os.PathLike[str],
     file: BinaryIO | None = None,
     keys: Sequence[str] | None = None,
-    known: Sequence[str] = (),
+    allowed: Sequence[str] = (),
 ) -> dict[str, Array]:
     """Arrays of an `.npz`, read without pickle.
 
@@ -40,11 +40,11 @@ def load_arrays(
         path: of the file, for errors.
         file: its contents, if they have been read already.
         keys: names of arrays; those that the file has are read. None reads all.
-        known: names of the parts that the file may have; any where there are none.
+        allowed: names of the parts that the file may have; any where there are none.
 
     Raises:
         InputError: the file is missing, damaged, larger than `LARGEST_BYTES`, or holds
-            something other than plain arrays, or one that is not known.
+            something other than plain arrays, or a part that is not allowed.
     """
     name = os.fspath(path)
     opened = open_regular(name, LARGEST_BYTES) if file is None else nullcontext(file)
@@ -53,8 +53,8 @@ def load_arrays(
         parsing(name, "a readable .npz file", "; copy or record it again"),
         zipfile.ZipFile(contents) as archive,
     ):
-        if known:
-            _check_parts(name, archive.namelist(), known)
+        if allowed:
+            _check_parts(name, archive.namelist(), allowed)
         members = _members(archive, keys)
         if sum(info.file_size for info in members.values()) > LARGEST_BYTES:
             raise InputError(
@@ -79,11 +79,11 @@ def _members(
     return members
 
 
-def _check_parts(name: str, files: Sequence[str], known: Sequence[str]) -> None:
+def _check_parts(name: str, files: Sequence[str], allowed: Sequence[str]) -> None:
     """Refuse a file with a part that is not known, or there twice: its name is damaged,
     and what it holds would be lost in silence."""
     for file in files:
-        if file not in known or files.count(file) > 1:
+        if file not in allowed or files.count(file) > 1:
             raise InputError(
                 f"{name}: has a part {short_text(file)}, which no recording has, or has "
                 "twice; copy or record it again"

@@ -15,7 +15,7 @@ from edge.arrays import Array, Booleans, Counts, Floats
 from edge.config import ConfigTable
 from edge.errors import InputError, about
 from edge.record.counts import as_counts, in_rows
-from edge.record.labels import Table, plain, read_table
+from edge.record.labels import LabelTable, plain, read_table
 from edge.record.npz import load_arrays, load_meta
 from edge.touch.frame import ONSETS, Frame
 from edge.touch.joint_angles import joint_columns
@@ -297,7 +297,7 @@ def read_meta(path: str | os.PathLike[str]) -> dict[str, Any]:
         InputError: as `load`.
     """
     name = os.fspath(path)
-    meta = load_meta(name, load_arrays(name, keys=("meta",), known=PARTS))
+    meta = load_meta(name, load_arrays(name, keys=("meta",), allowed=PARTS))
     with about(name):
         return {**meta, "labels": read_labels(name, meta.get("labels", {}))}
 
@@ -305,7 +305,7 @@ def read_meta(path: str | os.PathLike[str]) -> dict[str, Any]:
 def load(
     path: str | os.PathLike[str],
     file: BinaryIO | None = None,
-    table_of: Callable[[Path], Table] = read_table,
+    table_of: Callable[[Path], LabelTable] = read_table,
 ) -> Recording:
     """Read a recording, with the labels that the table beside it says.
 
@@ -327,7 +327,7 @@ def load(
             says, or the file is missing; the sentence names it and the remedy.
     """
     name = os.fspath(path)
-    arrays = load_arrays(name, file, known=PARTS)
+    arrays = load_arrays(name, file, allowed=PARTS)
     for key in ("t", "frames"):
         if key not in arrays:
             raise InputError(

@@ -12,7 +12,7 @@ import numpy as np
 
 from edge.arrays import Array
 from edge.errors import InputError
-from edge.record.labels import Table, read_table
+from edge.record.labels import LabelTable, read_table
 from edge.record.recording import KEYS, Recording, checked, warn_of_another_unit
 from edge.record.thresholds import doubt, shear_doubt
 from edge.writing import write_whole
@@ -131,7 +131,7 @@ def find(paths: Iterable[str]) -> list[Path]:
     return out
 
 
-def warn_of_gone(files: Iterable[Path], table_of: Callable[[Path], Table]) -> None:
+def warn_of_gone(files: Iterable[Path], table_of: Callable[[Path], LabelTable]) -> None:
     """Warn of rows in the tables of files whose own file is gone."""
     for folder in dict.fromkeys(file.parent for file in files):
         table = table_of(folder)

@@ -18,7 +18,7 @@ MOST_STEPS = 32
 """Steps of one taxel that a flood takes; more would cost as much as labelling all."""
 
 
-class Grid:
+class TaxelGrid:
     """Sets of taxels of a rows x cols grid; `wraps` joins its last column to its first.
 
     Taxels that share an edge are neighbours.
@@ -118,5 +118,5 @@ def best_cut(weights: Sequence[int]) -> int:
     return best
 
 
-grid = lru_cache(maxsize=16)(Grid)
+grid = lru_cache(maxsize=16)(TaxelGrid)
 """The grid of a shape; its masks are constants, so each is made once."""

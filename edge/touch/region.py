@@ -11,7 +11,7 @@ import numpy as np
 from edge.arrays import Array, Booleans, Indices
 from edge.errors import InputError
 from edge.touch.components import components_of
-from edge.touch.grid import Grid, grid
+from edge.touch.grid import TaxelGrid, grid
 
 
 class Region:
@@ -22,7 +22,7 @@ class Region:
         peak: largest count.
     """
 
-    def __init__(self, on: Grid, taxels: int | Indices, peak: int) -> None:
+    def __init__(self, on: TaxelGrid, taxels: int | Indices, peak: int) -> None:
         """Take the taxels as bits, or as indices (row * stride + col), of a grid."""
         self._grid = on
         self._taxels = taxels
@@ -31,7 +31,7 @@ class Region:
 
     @cached_property
     def bits(self) -> int:
-        """The taxels as the bits of an integer (see `Grid`)."""
+        """The taxels as the bits of an integer (see `TaxelGrid`)."""
         if isinstance(self._taxels, int):
             return self._taxels
         return self._grid.bits_at(self._taxels)
@@ -69,7 +69,7 @@ class ActiveTaxels:
     Attributes:
         counts: (rows, cols) of the frame.
         mask: (rows, cols), True on the active taxels.
-        bits: the active taxels as the bits of an integer (see `Grid`).
+        bits: the active taxels as the bits of an integer (see `TaxelGrid`).
     """
 
     def __init__(

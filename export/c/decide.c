@@ -173,7 +173,7 @@ static bool stop_product(const ec_task *task, ec_event *a) {
   int16_t pair = -1;
   for (uint32_t i = 0; i < task->labels; i++) {
     bool matches = index_of(task, 0, i) == f[0]->label && index_of(task, 1, i) == f[1]->label;
-    if (matches && pair < 0) pair = (int16_t)i;
+    if (matches) pair = (int16_t)i;
   }
   if (pair < 0 || a->label < 0) {
     withhold(a);
@@ -205,13 +205,14 @@ static bool is_decided(uint32_t index) {
 static int decide(ec_event *events) {
   int count = 0;
   bool refused = ask_all();
-  for (uint32_t turn = 0; turn < 2 * EC_TASKS; turn++) {
-    uint32_t i = turn % EC_TASKS;
-    if (decided[i] || is_product(&ec_tasks[i]) != (turn >= EC_TASKS)) continue;
-    if (!refused && !is_decided(i)) continue;
-    events[count++] = answers[i];
-    decided[i] = true;
-    waiting--;
+  for (int turn = 0; turn < 2; turn++) {
+    for (uint32_t i = 0; i < EC_TASKS; i++) {
+      if (decided[i] || is_product(&ec_tasks[i]) != turn) continue;
+      if (!refused && !is_decided(i)) continue;
+      events[count++] = answers[i];
+      decided[i] = true;
+      waiting--;
+    }
   }
   return count;
 }

@@ -47,9 +47,9 @@ static void to_rate(double *x, uint32_t n, double step_s) {
   double before = x[0];
   x[0] = (x[1] - x[0]) / step_s;
   for (uint32_t i = 1; i + 1 < n; i++) {
-    double now = x[i];
+    double value = x[i];
     x[i] = (x[i + 1] - before) / (2.0 * step_s);
-    before = now;
+    before = value;
   }
   x[n - 1] = (x[n - 1] - before) / step_s;
 }

@@ -37,7 +37,7 @@ static struct {
   const uint8_t *row; /* of a matrix, the next */
 } now;
 
-double ec_at(const ec_series *series, uint32_t i) {
+static double at(const ec_series *series, uint32_t i) {
   if (series->type == EC_FLOATS) return (double)ec_model_now.floats[series->place + i];
   if (series->type == EC_DOUBLES) return ec_model_now.doubles[series->place + i];
   return ec_model_now.doubles[series->palette + ec_model_now.bytes[series->place + i]];
@@ -98,7 +98,7 @@ static bool projected(const ec_projection *p) {
   }
   for (uint32_t i = now.begin; i < now.end; i++) {
     uint32_t feature = p->columns == EC_NOWHERE ? i : ec_model_now.words[p->columns + i];
-    double rounded = ec_rint((ec_vector[feature] - ec_at(&p->means, feature)) * ec_at(&p->gains, i));
+    double rounded = ec_rint((ec_vector[feature] - at(&p->means, feature)) * at(&p->gains, i));
     double step = inside(rounded, p->most_steps);
     if (step != rounded) excess += rounded < step ? step - rounded : rounded - step;
     int32_t factor = whole(step);
@@ -179,9 +179,9 @@ static bool doubt_of_trials(const ec_doubt *d) {
       weighted += (sum - before) * weights[i];
       before = sum;
     }
-    double far = (double)sum * ec_at(&d->nearness, trial);
+    double far = (double)sum * at(&d->nearness, trial);
     double unit = ec_exp2(-EC_FRACTION_BITS);
-    double farther = (double)weighted * unit * ec_at(&d->weighted_nearness, trial);
+    double farther = (double)weighted * unit * at(&d->weighted_nearness, trial);
     if (far < nearest_squares) nearest_squares = far;
     if (farther < nearest_weighted) nearest_weighted = farther;
   }

@@ -1,5 +1,5 @@
 /* An example: touches as lines of text, the time in seconds and a count for each taxel; its events as
-   lines of JSON. `gcc -std=c99 -O2 -ffp-contract=off *.c -o decide` builds it. */
+   lines of JSON. `gcc -std=c99 -Os -ffp-contract=off *.c -o decide` builds it. */
 #include <stdio.h>
 
 #include "edge_classify.h"

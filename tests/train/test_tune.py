@@ -39,7 +39,7 @@ def touch(label, seed, *, first=(300, 300), gap=GAP):
 
 
 @pytest.fixture
-def saved(tmp_path):
+def folder_of(tmp_path):
     """The function that saves twelve touches to a folder."""
 
     def save_all(**how):
@@ -51,8 +51,8 @@ def saved(tmp_path):
     return save_all
 
 
-def test_the_board_follows_a_contact_across_gaps_as_the_fit_did(saved, tmp_path):
-    fitted = train.fit(saved(), **GIVEN)
+def test_the_board_follows_a_contact_across_gaps_as_the_fit_did(folder_of, tmp_path):
+    fitted = train.fit(folder_of(), **GIVEN)
     assert fitted.dataset.layout.release_s == 1.0
     assert any("12 of 12 touches are fragmented" in note for note in fitted.notes)
     save_model(tmp_path / "model.onnx", fitted)
@@ -71,9 +71,9 @@ def test_the_board_follows_a_contact_across_gaps_as_the_fit_did(saved, tmp_path)
     [({"first": (200, 600)}, {}, 0.3), ({}, {"release": 0.5}, 0.5)],
 )
 def test_contacts_end_as_ever_where_the_first_piece_tells_as_much_or_as_asked_for(
-    saved, touches, options, release_s
+    folder_of, touches, options, release_s
 ):
-    fitted = train.fit(saved(**touches), **options, **GIVEN)
+    fitted = train.fit(folder_of(**touches), **options, **GIVEN)
     assert fitted.dataset.layout.release_s == release_s
     assert not any("across gaps" in note for note in fitted.notes)
 
@@ -81,14 +81,14 @@ def test_contacts_end_as_ever_where_the_first_piece_tells_as_much_or_as_asked_fo
 OF_SKIN = Levels(None, None, None)
 
 
-def test_nothing_is_tried_where_touches_are_whole(saved):
-    dataset = load_trials([saved(gap=slice(140, 150))])
-    tried = longer_release(OF_SKIN, lambda _: dataset, pytest.fail)
-    assert tried == (OF_SKIN, [])
+def test_nothing_is_tried_where_touches_are_whole(folder_of):
+    dataset = load_trials([folder_of(gap=slice(140, 150))])
+    result = longer_release(OF_SKIN, lambda _: dataset, pytest.fail)
+    assert result == (OF_SKIN, [])
 
 
-def test_a_gain_counts_recordings_without_a_touch_too(saved):
-    touched = load_trials([saved()])
+def test_a_gain_counts_recordings_without_a_touch_too(folder_of):
+    touched = load_trials([folder_of()])
     dataset = replace(touched, untouched=touched.unused)
     accuracies = {None: 0.9, 1.0: 1.0, 3.0: 1.0}
     levels, (note,) = longer_release(

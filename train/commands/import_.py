@@ -26,7 +26,7 @@ from train import former_recordings
 from train.data.broken import BrokenTaxels
 from train.data.scratch import Scratch
 from train.data.thresholds import proposed
-from train.importers import Refused, Trial, names
+from train.importers import ImportedTrial, Refused, names
 from train.importers.look import contacts_in, rows_of
 from train.progress import bar, say
 
@@ -109,7 +109,7 @@ class FirstOfEachKind(logging.Filter):
 
 
 def write(
-    trials: Iterator[Trial | Refused],
+    trials: Iterator[ImportedTrial | Refused],
     arm: Chain | None,
     arguments: argparse.Namespace,
 ) -> int:

@@ -6,7 +6,7 @@ labels. Then a person has a look (`look`), and the recordings are written.
 
 A module `NAME.py` here adds `python -m train import NAME FILE --out DIR`. It has
 
-    def trials(path: Path, arm: Chain | None = None) -> Iterator[Trial | Refused]
+    def trials(path: Path, arm: Chain | None = None) -> Iterator[ImportedTrial | Refused]
 
 which yields each trial, and a sentence for each file or trial that is left out, and
 raises `edge.errors.InputError` if the file is not of the format. `arm` is the one that
@@ -35,7 +35,7 @@ SHARED = {
 """Modules that the formats share."""
 
 
-class Trial(NamedTuple):
+class ImportedTrial(NamedTuple):
     """A trial by the name of its file, without `.npz`."""
 
     name: str

@@ -20,13 +20,13 @@ from train.importers.options import UNITS_S, TableOptions
 from train.importers.table import Table, numbered, numbers_of, require_converted
 
 UNIT_NAMES = {
-    "s": "s sec second seconds",
-    "ms": "ms msec millis milliseconds",
-    "us": "us usec µs micros microseconds",
-    "ns": "ns nsec nanos nanoseconds",
+    "s": ("s", "sec", "second", "seconds"),
+    "ms": ("ms", "msec", "millis", "milliseconds"),
+    "us": ("us", "usec", "µs", "micros", "microseconds"),
+    "ns": ("ns", "nsec", "nanos", "nanoseconds"),
 }
 """{unit: its names}."""
-UNITS = {name: unit for unit, names in UNIT_NAMES.items() for name in names.split()}
+UNITS = {name: unit for unit, names in UNIT_NAMES.items() for name in names}
 TIME = re.compile(
     r"(?:(?:elapsed|relative|rel|system|sys|log|frame)[ _]*)?"
     r"(?:ts|t|time|time_?stamp|stamp|clock|datetime|epoch|zeit|zeitstempel)"
@@ -50,6 +50,8 @@ EPOCHS = {"ns": 9e17, "us": 9e14, "ms": 9e11, "s": 9e8}
 LONGEST_STEP = 0.25
 DOUBTFUL_BELOW = 3.0
 """Median steps that are certainly in a unit, and that may be in the next smaller one."""
+LIKELY_TIMES = 3
+"""Columns that rise, which a sentence names at most."""
 TAXELS = re.compile("taxel|tactile", re.I)
 """How a name begins that is a taxel's even beside others with running numbers."""
 
@@ -185,12 +187,12 @@ def meaning(table: Table, options: TableOptions) -> Meaning:
     """
     joints = columns(table, options.joints) if options.joints else []
     time = _time_column(table, joints, options)
-    used = {time, *joints}
+    in_use = {time, *joints}
     if options.onset_column:
-        used.add(column(table, "--onset-column", options.onset_column))
-    rest = [name for name in table.names if name not in used]
+        in_use.add(column(table, "--onset-column", options.onset_column))
+    rest = [name for name in table.names if name not in in_use]
     taxels, shape = _taxels(table, rest, options)
-    for name in used.intersection(taxels):
+    for name in in_use.intersection(taxels):
         raise InputError(
             f"{table.where}: column {name} is named both as a taxel and as time, joint "
             "or onset"
@@ -218,7 +220,7 @@ def _time_column(
         typed(table, [name])
         for name in numbers
         if (numbers[name].diff()[1:] > 0.0).all()
-    ]
+    ][:LIKELY_TIMES]
     raise InputError(
         f"{table.where}: no column is called a time; give --rate HZ, such as --rate 100, "
         f"or --time {' or '.join(rising) or 'COL'}, among {short_text(table.names)}"
@@ -376,5 +378,5 @@ def onsets_of(
         return [float(t[0])] if options.onset else []
     name = column(table, "--onset-column", options.onset_column)
     cells = table.data[name].astype(str).to_numpy()
-    left = cells != cells[0]
-    return [float(at) for at in t[1:][left[1:] & ~left[:-1]]]
+    is_away = cells != cells[0]
+    return [float(at) for at in t[1:][is_away[1:] & ~is_away[:-1]]]

@@ -191,12 +191,12 @@ class Rest:
             normal = counts[..., 0]
             if self.values is not None:
                 normal[...] = np.maximum(-normal, 0.0) if self.falls else abs(normal)
-            whole = np.rint(counts)
+            rounded = np.rint(counts)
             is_within = normal.min() > -0.5 and normal.max() < MOST_COUNTS + 0.5
-            is_within &= _largest(whole[..., 1:]) <= MOST_SHEAR
-            if not is_within or (is_exact and not np.array_equal(counts, whole)):
+            is_within &= _largest(rounded[..., 1:]) <= MOST_SHEAR
+            if not is_within or (is_exact and not np.array_equal(counts, rounded)):
                 return None
-            parts.append(whole.astype(np.int32))
+            parts.append(rounded.astype(np.int32))
         return np.concatenate(parts)
 
     def refusal(self, trial: Samples) -> InputError:

@@ -34,7 +34,7 @@ from edge.record.labels import TABLE
 from edge.touch.arm import Chain
 from edge.touch.layout import RELEASE_S
 from train.data.scratch import Scratch
-from train.importers import Refused, Trial, clock
+from train.importers import ImportedTrial, Refused, clock
 from train.importers.axes import parted
 from train.importers.columns import Meaning, meaning, onsets_of, quoted, times_of
 from train.importers.counts import Samples, rest_of, skin_shape
@@ -96,7 +96,7 @@ def trials(
     path: Path,
     arm: Chain | None,
     arguments: argparse.Namespace,
-) -> Iterator[Trial | Refused]:
+) -> Iterator[ImportedTrial | Refused]:
     """One recording for each file of a folder, or for each trial of a long table.
 
     Prints the columns used and ignored. The numbers of trials wait in temporary files
@@ -269,7 +269,7 @@ def _recorded(
     trials: Sequence[Measured],
     samples: OnDisk,
     options: TableOptions,
-) -> Iterator[Trial | Refused]:
+) -> Iterator[ImportedTrial | Refused]:
     """The recordings of trials of the same columns; prints the columns used and
     ignored."""
     folder = path if path.is_dir() else path.parent
@@ -290,7 +290,7 @@ def _recorded(
         meta |= _meta(trial, arm, options)
         if name not in labels.left_out:
             recordings = map(rest.recording, [values], [shape], [meta])
-            yield from _tried(map(Trial, [name], recordings))
+            yield from _tried(map(ImportedTrial, [name], recordings))
 
 
 def _meta(trial: Measured, arm: Chain | None, options: TableOptions) -> dict[str, Any]:

@@ -10,8 +10,7 @@ import pandas as pd
 
 from edge.config import short_text
 from edge.errors import InputError
-from edge.record.labels import TABLE, Row, read_table
-from edge.record.labels import Table as LabelTable
+from edge.record.labels import TABLE, LabelTable, Row, read_table
 from train.importers.forms.file import inner
 from train.importers.forms.long import plain
 from train.importers.forms.text import is_number
@@ -119,10 +118,10 @@ def labels_of(
         InputError: labels.csv is damaged or names none of the trials, or an option
             names a column or word that is not there.
     """
-    told = _told(places, options)
+    stated = _stated_labels(places, options)
     table = read_table(folder, "trial")
     if not table.contents:
-        return told
+        return stated
     rows = _by_trial(table)
     names = [place.name for place in places]
     if not set(names) & rows.keys():
@@ -168,7 +167,7 @@ def _by_trial(table: LabelTable) -> dict[str, Row]:
     return rows
 
 
-def _told(places: Sequence[Place], options: TableOptions) -> Labels:
+def _stated_labels(places: Sequence[Place], options: TableOptions) -> Labels:
     """The labels that the files tell."""
     if options.label:
         return _stated(places, options.label, options.task)

@@ -33,7 +33,7 @@ def rows_of(recording: Recording) -> list[str]:
 
 def contacts_in(recordings: Sequence[Recording]) -> str:
     """How many recordings have a contact, and if few, why, and what to type."""
-    contacts = [count_felt([each], each.layout.onset) for each in recordings]
+    contacts = [count_felt([r], r.layout.onset) for r in recordings]
     text = f"{sum(contacts)} of {len(recordings)} have a contact"
     if sum(contacts) >= FEW * len(recordings):
         return text

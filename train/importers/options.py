@@ -77,7 +77,7 @@ def add_value_options(parser: argparse.ArgumentParser) -> None:
     add(
         "--flip",
         type=str.lower,
-        choices="x y z xy xz yz xyz".split(),
+        choices=("x", "y", "z", "xy", "xz", "yz", "xyz"),
         metavar="XYZ",
         help="letters of the axes whose sign is turned round",
     )

@@ -14,7 +14,7 @@ from pathlib import Path
 from edge.errors import InputError
 from edge.files import open_regular, parsing
 from edge.touch.arm import Chain
-from train.importers import Trial
+from train.importers import ImportedTrial
 from train.importers.options import LogOptions
 from train.importers.table import needs
 from train.importers.topics import Log
@@ -35,7 +35,7 @@ def trials(
     path: Path,
     arm: Chain | None,
     arguments: argparse.Namespace,
-) -> Iterator[Trial]:
+) -> Iterator[ImportedTrial]:
     """The one trial of the bag."""
     with needs("rosbags", "this"):
         from rosbags.highlevel import AnyReader
@@ -55,7 +55,7 @@ def trials(
         for connection, logged_ns, raw in messages:
             message = reader.deserialize(raw, connection.msgtype)
             log.add(connection.topic, connection.msgtype, message, logged_ns * 1e-9)
-    yield Trial(path.stem, log.recording())
+    yield ImportedTrial(path.stem, log.recording())
 
 
 def _require_messages_of_ros(path: Path) -> None:

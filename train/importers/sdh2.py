@@ -22,7 +22,7 @@ from edge.files import parsing
 from edge.record.recording import Recording
 from edge.touch.arm import Chain
 from edge.touch.layout import RELEASE_S, SkinLayout
-from train.importers import Trial, clock
+from train.importers import ImportedTrial, clock
 from train.importers.forms.file import read_unpacked
 
 PADS = (1, 5)
@@ -36,7 +36,7 @@ ONSET_COUNTS = 60
 contact."""
 
 
-def trials(path: Path, arm: Chain | None = None) -> Iterator[Trial]:
+def trials(path: Path, arm: Chain | None = None) -> Iterator[ImportedTrial]:
     """One recording for each file: the two pads side by side, with an invalid column
     between them.
 
@@ -55,7 +55,7 @@ def trials(path: Path, arm: Chain | None = None) -> Iterator[Trial]:
         )
     for i, file in enumerate(paths):
         recording = grasp(file)
-        yield Trial(f"{i:04d}_{recording.labels['object']}", recording)
+        yield ImportedTrial(f"{i:04d}_{recording.labels['object']}", recording)
 
 
 def files(folder: Path) -> list[Path]:
@@ -147,12 +147,14 @@ def _pads(root: ElementTree.Element) -> Pads:
         cells += rows * cols
     if sorted(places) != list(PADS):
         raise ValueError(f"it lacks matrix {PADS[0]} or {PADS[1]}, the pads that touch")
-    left, right = (places[pad] for pad in PADS)
-    if left.shape != right.shape:
-        raise ValueError(f"its pads differ: {left.shape} and {right.shape} texels")
-    between = np.full((len(left), 1), cells)
-    side_by_side = np.hstack([left, between, right])
-    working = np.hstack([alive[PADS[0]], between < cells, alive[PADS[1]]])
+    left_pad, right_pad = (places[pad] for pad in PADS)
+    if left_pad.shape != right_pad.shape:
+        raise ValueError(
+            f"its pads differ: {left_pad.shape} and {right_pad.shape} texels"
+        )
+    gap = np.full((len(left_pad), 1), cells)
+    side_by_side = np.hstack([left_pad, gap, right_pad])
+    working = np.hstack([alive[PADS[0]], gap < cells, alive[PADS[1]]])
     return Pads(side_by_side, working, cells, pitch_m)
 
 

@@ -48,7 +48,16 @@ LOG = logging.getLogger(__name__)
 IMAGE = "sensor_msgs/msg/Image"
 ARRAYS = tuple(
     f"std_msgs/msg/{name}MultiArray"
-    for name in "UInt8 Int8 UInt16 Int16 UInt32 Int32 Float32 Float64".split()
+    for name in (
+        "UInt8",
+        "Int8",
+        "UInt16",
+        "Int16",
+        "UInt32",
+        "Int32",
+        "Float32",
+        "Float64",
+    )
 )
 JOINTS = "sensor_msgs/msg/JointState"
 FRAMES = (IMAGE, *ARRAYS)
@@ -323,9 +332,9 @@ def values_of(kind: str, message: Any, options: LogOptions) -> NDArray[np.float6
     if name is None:
         raise Unusable(f"is {kind}; give --field, the name of the values in it")
     if options.axes is not None:
-        for axes in (".x .y .z", "x y z", "X Y Z"):
+        for axes in ((".x", ".y", ".z"), "xyz", "XYZ"):
             with suppress(Unusable):
-                values = [field_values(message, name + axis) for axis in axes.split()]
+                values = [field_values(message, name + axis) for axis in axes]
                 return np.stack(values, axis=-1)
     return field_values(message, name)
 

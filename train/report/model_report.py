@@ -32,7 +32,7 @@ from train.model.pipeline import (
 from train.report import page
 from train.report.figures import confusion
 from train.report.score import interval, percent
-from train.report.section import Row, Section, Table
+from train.report.section import ReportTable, Row, Section
 from train.report.summary import Prices, accuracy, candidates, names
 from train.report.work import Workers
 
@@ -198,7 +198,7 @@ def _recordings(fitted: Fitted) -> Section:
         {"key": key, "value": value, "trials": count}
         for (key, value), count in sorted(Counter(values).items())
     ]
-    return Section("Recordings", tables=[Table("recordings", "Trials", rows)])
+    return Section("Recordings", tables=[ReportTable("recordings", "Trials", rows)])
 
 
 def _accuracy(exported: Exported, task: str) -> Section:
@@ -238,7 +238,7 @@ def _accuracy(exported: Exported, task: str) -> Section:
     return Section(
         f"Accuracy: {task}",
         [text],
-        [Table(f"recall_{_file(task)}", f"{task}: scores of each class", rows)],
+        [ReportTable(f"recall_{_file(task)}", f"{task}: scores of each class", rows)],
         [
             confusion(
                 f"confusion_{_file(task)}",
@@ -276,7 +276,7 @@ def _wrong(exported: Exported) -> Section:
         "and failed touches often stand out here. `edge-classify explain` names the "
         "nearest trials of any recording."
     ]
-    table = Table("wrong", "Wrong answers", rows)
+    table = ReportTable("wrong", "Wrong answers", rows)
     return Section("Wrong answers", text if rows else ["None."], [table])
 
 
@@ -288,7 +288,7 @@ def _features(exported: Exported) -> Section:
         {"feature": name, "unit": "" if unit == "1" else unit, "values": width}
         for (name, unit), width in zip(dataset.units.items(), widths, strict=True)
     ]
-    return Section("Features", tables=[Table("features", "Features", rows)])
+    return Section("Features", tables=[ReportTable("features", "Features", rows)])
 
 
 def _sizes(exported: Exported) -> Section:

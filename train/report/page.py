@@ -11,13 +11,13 @@ from jinja2 import Environment, FileSystemLoader
 from markupsafe import Markup, escape
 
 from edge.writing import write_whole
-from train.report.section import Section, Table
+from train.report.section import ReportTable, Section
 
 STYLE = Path(__file__).with_suffix(".css").read_text(encoding="utf-8")
 CODE = re.compile(r"`([^`]+)`")
 
 
-def table_csv(table: Table) -> dict[str, str]:
+def table_csv(table: ReportTable) -> dict[str, str]:
     """{file name: CSV text} of the table; columns measured by a clock have a file of
     their own."""
     frame = table.frame
@@ -44,7 +44,7 @@ def _prose(text: object) -> Markup:
     return Markup(CODE.sub(r"<code>\1</code>", str(escape(text))))
 
 
-def _cells(table: Table) -> Markup:
+def _cells(table: ReportTable) -> Markup:
     """The table as HTML."""
     with pd.option_context("display.max_colwidth", None):
         text = table.frame.to_html(

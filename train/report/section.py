@@ -11,7 +11,7 @@ Row = dict[str, Any]
 
 
 @dataclass
-class Table:
+class ReportTable:
     """A table of the report, which is also written as a CSV file.
 
     Attributes:
@@ -64,6 +64,6 @@ class Section:
 
     title: str
     text: Sequence[str] = ()
-    tables: Sequence[Table] = ()
+    tables: Sequence[ReportTable] = ()
     figures: Sequence[Figure] = ()
     terms: Mapping[str, str] = field(default_factory=dict)

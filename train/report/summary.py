@@ -15,7 +15,7 @@ from train.data.groups import TRIAL
 from train.fitted import Fitted
 from train.model.pipeline import Choice
 from train.report.score import interval
-from train.report.section import Row, Table
+from train.report.section import ReportTable, Row
 
 Prices = Sequence[tuple[float, float]]
 """Microseconds of a decision on this machine, and kilobytes, for each candidate."""
@@ -71,7 +71,7 @@ def _by_unit(units: Mapping[str, str]) -> list[str]:
     return [f"{words}: {', '.join(names)}" for words, names in features.items()]
 
 
-def candidates(fitted: Fitted, prices: Prices) -> Table:
+def candidates(fitted: Fitted, prices: Prices) -> ReportTable:
     """A row for each candidate that was not dropped, with the nested accuracy of its
     own settings and its price."""
     rows: list[Row] = []
@@ -91,7 +91,7 @@ def candidates(fitted: Fitted, prices: Prices) -> Table:
         row["us per decision"] = round(us, 1)
         row["kB"] = round(kilobytes, 1)
         rows.append(row)
-    return Table("candidates", "Candidates", rows, ("us per decision",))
+    return ReportTable("candidates", "Candidates", rows, ("us per decision",))
 
 
 def accuracy(chosen: Chosen) -> str:

@@ -8,7 +8,7 @@ import pandas as pd
 
 from edge.decide.statistics import wilson
 from edge.errors import counted
-from train.report.section import Section, Table
+from train.report.section import ReportTable, Section
 
 Numbers = Mapping[tuple[str, str, str], float]
 """{(table, setting, task): accuracy in percent}."""
@@ -106,5 +106,5 @@ def comparison(data_sets: Sequence[Numbers], tested: int) -> Section:
             "lacks some. In Table II some of the paper's methods are the same "
             "classifier; see the section on scaling.",
         ],
-        [Table("paper", title, rows)],
+        [ReportTable("paper", title, rows)],
     )

@@ -15,7 +15,7 @@ from train.data.dataset import DataSet
 from train.data.vectors import Labels
 from train.model.scaling import OF_PAPER
 from train.report.score import grid_search, score
-from train.report.section import Row, Section, Table
+from train.report.section import ReportTable, Row, Section
 from train.report.skins import coarser, follow, vectors
 from train.report.work import Workers
 from train.simulate.scene_model import Scene
@@ -117,7 +117,9 @@ def _compared(
     cells = rows(column, dict(zip(cases, answers, strict=True)), table)
     heading = f"Accuracy with each choice of {column}"
     return Section(
-        f"Effect of {column} (Table {table})", [text], [Table(column, heading, cells)]
+        f"Effect of {column} (Table {table})",
+        [text],
+        [ReportTable(column, heading, cells)],
     )
 
 
@@ -152,5 +154,5 @@ def resolution(context: Context) -> Section:
             "contact, and the contact motion is that of the skin's middle, which "
             "follows from the joint angles.",
         ],
-        [Table("resolution", "Accuracy with larger taxels", cells)],
+        [ReportTable("resolution", "Accuracy with larger taxels", cells)],
     )

@@ -9,7 +9,7 @@ from edge.arrays import Floats
 from train.choose.evaluate import Result
 from train.report.figures import picture
 from train.report.score import majority, percent, shares
-from train.report.section import Figure, Row, Section, Table
+from train.report.section import Figure, ReportTable, Row, Section
 from train.tradeoff.choices import WINDOWS_S, unseen
 from train.tradeoff.measured import Measurements
 
@@ -57,7 +57,8 @@ def section(measurements: Measurements) -> Section:
     return Section(
         "Accuracy after each time",
         tables=[
-            Table(f"answer_{t}", t, answers(measurements, t)) for t in measurements.y
+            ReportTable(f"answer_{t}", t, answers(measurements, t))
+            for t in measurements.y
         ],
         figures=[picture_of(measurements)],
     )

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 from edge.errors import InputError
 from train.json_files import json_file
-from train.report.section import Section, Table
+from train.report.section import ReportTable, Section
 
 STAGES = ("track", "features", "decision")
 
@@ -74,15 +74,18 @@ def section(board: Board) -> Section:
             "`edge-classify bench` measured these times with the model "
             f"{board.model[:12]} on {board.name}. The program takes "
             f"{board.memory_mb:.0f} MB of memory, and the model is ready "
-            f"{board.cold_start_ms:.0f} ms after the start of Python. The stage `region` "
-            "finds the contact in a frame; `track` does this and measures the contact; "
-            "`answer` is features and decision; `frame` and `last` are all work for a "
-            "frame in a contact, and for the frame that decides. The arithmetic of a "
+            f"{board.cold_start_ms:.0f} ms after the start of Python. The stage `track` "
+            "finds the contact in a frame and measures it; `frame` and `last` are all work "
+            "for a frame in a contact, and for the frame that decides. The arithmetic of a "
             "decision is the sum of the medians of track, features and decision. `make "
             "tradeoff` measures a quick model. Another board has other times: run "
             "`edge-classify bench` on it, and give the file as `BOARD=board.json`.",
         ],
-        [Table("board", "Stages", rows, timed=("median us", "99th percentile us"))],
+        [
+            ReportTable(
+                "board", "Stages", rows, timed=("median us", "99th percentile us")
+            )
+        ],
     )
 
 

@@ -17,7 +17,7 @@ from train.data.dataset import DataSet, Recordings
 from train.data.folds import finest, stratified_folds
 from train.data.parts import part
 from train.report.score import paired, points
-from train.report.section import Row, Section, Table
+from train.report.section import ReportTable, Row, Section
 from train.report.skins import coarser
 from train.report.work import Workers
 from train.tradeoff.choices import Points, chosen, followed
@@ -200,5 +200,5 @@ def section(measurements: Measurements) -> Section:
             "again with the features that suit the change. A larger taxel reads the sum "
             "of the forces on its area. The last section explains points and intervals.",
         ],
-        [Table("costs", title, measurements.costs)],
+        [ReportTable("costs", title, measurements.costs)],
     )

@@ -156,7 +156,7 @@ def at_errors(
         _, wrong = known.under(rule)
         right = None
         if unseen is not None:
-            _, missed = unseen.under(rule)
-            right = ~missed
+            wrong_when_unseen = unseen.under(rule)[1]
+            right = ~wrong_when_unseen
         decisions.append(EarlyDecisions(error, rule.mean_s, ~wrong, right))
     return decisions

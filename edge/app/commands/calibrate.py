@@ -79,7 +79,7 @@ def moved_together(
         return []
     if former is not None:
         limit = file.layout.threshold_counts or limit
-        change = np.abs(baseline.astype(np.int64) - former.baseline)
+        change = np.abs(baseline.astype(np.int64) - former.baseline) * file.working
     else:
         change = standing_out(file, baseline)
     taxels: list[tuple[int, int]] = []
@@ -101,7 +101,7 @@ def _apart(former: TaxelCalibration | None) -> str:
 
 def _rest(file: SkinFile, measured: RestValues) -> str:
     """Where the working taxels rest: half of them within this distance of the median."""
-    rest = measured.calibration.baseline.ravel()[list(file.served)].astype(np.int64)
+    rest = measured.calibration.baseline[file.working].astype(np.int64)
     middle = int(np.median(rest))
     spread = int(np.median(np.abs(rest - middle)))
     return f"{counted(len(rest), 'taxel')} rest at {middle} +- {spread}"
@@ -110,7 +110,9 @@ def _rest(file: SkinFile, measured: RestValues) -> str:
 def first_rest(file: SkinFile, measured: RestValues) -> str:
     """Where the chips rest, and where they usually do, for a person to judge."""
     rest = measured.calibration.baseline.ravel()
-    middles = [int(np.median(rest[chip.served])) for chip in file.chips]
+    working = file.working.ravel()
+    of_chips = [[i for i in chip.served if working[i]] for chip in file.chips]
+    middles = [int(np.median(rest[taxels])) for taxels in of_chips if taxels]
     usual = {
         f"an {kind.name.upper()} usually at {kind.usual_rest[0]} to {kind.usual_rest[1]}"
         for kind in {chip.kind for chip in file.chips}
@@ -128,7 +130,7 @@ def problems(
     """Sentences on a calibration that was measured on a touched or very noisy skin; they
     name the taxels."""
     noise = calibration.noise
-    restless = noisiest_taxels(noise)
+    restless = noisiest_taxels(file, noise)
     if restless:
         yield (
             f"taxels that vary while they should be at rest: {len(restless)}, by up to "
@@ -214,7 +216,7 @@ def run(arguments: argparse.Namespace) -> int:
             "give --yes for this first calibration"
         )
     backup = save_calibration(arguments.skin, measured.calibration)
-    median = float(np.median(noise))
+    median = float(np.median(noise[file.working]))
     largest = float(noise.max())
     event = {
         "event": "calibrated",
@@ -224,7 +226,7 @@ def run(arguments: argparse.Namespace) -> int:
         "noise_median": round(median, 3),
         "noise_largest": round(largest, 3),
         "kept": replaced,
-        "moving": noisiest_taxels(noise),
+        "moving": noisiest_taxels(file, noise),
     }
     Output.of(arguments).event(
         event,

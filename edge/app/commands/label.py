@@ -21,7 +21,7 @@ from edge.app.review import Touch, changed
 from edge.app.texts import labels_text
 from edge.errors import InputError, counted
 from edge.record.changes import FORMER, Change, change, former, now, undo
-from edge.record.labels import Standing, Table, read_table
+from edge.record.labels import LabelTable, Standing, read_table
 from edge.record.recording import read_meta
 from edge.record.saving import listed, warn_of_gone
 from edge.record.slips import counts_text, slips
@@ -100,7 +100,7 @@ def run(arguments: argparse.Namespace) -> int:
     return 0
 
 
-def read(paths: Iterable[Path], table_of: Callable[[Path], Table]) -> list[Touch]:
+def read(paths: Iterable[Path], table_of: Callable[[Path], LabelTable]) -> list[Touch]:
     """The recordings of some files."""
     return review.touches({path: read_meta(path) for path in paths}, table_of)
 

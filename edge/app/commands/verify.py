@@ -36,7 +36,7 @@ def run(arguments: argparse.Namespace) -> int:
         verdict = "ok" if check.passed else "DIFFERS"
         text = f"{verdict:<8} {check.name:<{width}} {check.rows:>6} rows"
         if not check.passed:
-            value = " ".join(check.seen.split())
+            value = " ".join(check.value.split())
             expected = " ".join(check.expected.split())
             text += f"; the first is row {check.row}: {value} instead of {expected}"
         output.event(event, text)

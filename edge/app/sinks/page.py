@@ -86,9 +86,9 @@ class Page:
         """
         self.schedule: Schedule | None = None
         self._folder = folder
-        given = dict(labels or {})
-        self.labels = {task: label for task, label in given.items() if label}
-        self._waits = given.keys() - self.labels.keys()
+        tasks = dict(labels or {})
+        self.labels = {task: label for task, label in tasks.items() if label}
+        self._waits = tasks.keys() - self.labels.keys()
         self.recording = bool(self.labels) and not self._waits
         self._touches: dict[str, Touch] = {}
         """Those of the folder by file, the newest first."""
@@ -194,11 +194,11 @@ class Page:
         the labels that have changed; what cannot be read is named once."""
         if self._folder is None:
             return
-        known = {touch.path: touch.meta for touch in self._touches.values()}
+        read = {touch.path: touch.meta for touch in self._touches.values()}
         metas = {}
         for path in sorted(self._folder.glob("[!.]*.npz")):
             with self._naming("; the list skips it"):
-                metas[path] = known.get(path) or read_meta(path)
+                metas[path] = read.get(path) or read_meta(path)
         with self._naming():
             touches = review.touches(metas, cache(read_table))
             touches.sort(key=lambda touch: touch.path.stat().st_mtime_ns)

@@ -74,7 +74,6 @@ class LinuxBus:
         self.name = device
         self.timeout_s = timeout_s
         self._smbus: Any = None
-        self._fd = -1
         self._asked: set[int] = set()
         """Addresses that no driver of the kernel owned when a transfer was first
         prepared."""
@@ -100,11 +99,7 @@ class LinuxBus:
             if not smbus.funcs & smbus2.I2cFunc.I2C:
                 raise OSError(errno.EOPNOTSUPP, "no plain I2C")
             flock(smbus.fd, LOCK_EX | LOCK_NB)
-            ioctl(
-                smbus.fd,
-                I2C_TIMEOUT,
-                max(1, math.ceil(self.timeout_s * 100.0 - 1e-9)),
-            )
+            ioctl(smbus.fd, I2C_TIMEOUT, math.ceil(self.timeout_s * 100.0 - 1e-9))
         except OSError as error:
             smbus.close()
             if isinstance(error, BlockingIOError):
@@ -121,7 +116,7 @@ class LinuxBus:
             BusBusy: a driver of the kernel owns the address.
         """
         address = messages[0].address
-        if address not in self._asked and self._fd >= 0:
+        if address not in self._asked and self._smbus is not None:
             try:
                 ioctl(self._fd, I2C_SLAVE, address)
             except OSError as error:
@@ -149,15 +144,15 @@ class LinuxBus:
         """
         try:
             completed = ioctl(self._fd, I2C_RDWR, prepared.handle)
+            if completed != len(prepared.messages):
+                # The kernel stopped half way without an error, and the buffer holds an
+                # older reading.
+                raise OSError(errno.EIO, "short")
         except (OSError, ValueError) as error:
             # A closed bus has the file descriptor -1, which ioctl answers with
             # ValueError.
             code = getattr(error, "errno", errno.ENODEV)
             raise bus_error(code, self.name, prepared.messages[0].address) from None
-        if completed != len(prepared.messages):
-            # The kernel stopped half way without an error, and the buffer holds an
-            # older reading.
-            raise bus_error(errno.EIO, self.name, prepared.messages[0].address)
 
     def close(self) -> None:
         """Close it; calling it twice is fine."""

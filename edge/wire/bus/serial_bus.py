@@ -11,6 +11,7 @@ import errno
 import time
 from collections.abc import Sequence
 from contextlib import suppress
+from itertools import cycle
 from typing import Any
 
 import numpy as np
@@ -92,11 +93,11 @@ def serial_bits(messages: Sequence[Message]) -> int:
     included.
 
     >>> from edge.wire.chips.block import data_bytes
-    >>> serial_bits([write(0, b"\\x10"), read(0, 4 + data_bytes(100, 12))])
-    1630
+    >>> serial_bits([write(0, b"\\x10"), read(0, 4 + data_bytes(300, 12))])
+    4640
     """
     request = 4
-    answer = 1 + len(messages[-1].buffer)
+    answer = 1 + len(messages[1].buffer)
     packets = (n + n // 254 + 2 for n in (request, answer))
     return 10 * sum(packets)
 
@@ -139,9 +140,7 @@ class SerialBus:
         self.timeout_s = timeout_s
         self._port: Any = None
         self._received = bytearray()
-        self._tag = 0
-        self._heard = False
-        """Some bytes have come since the last request."""
+        self._tags = cycle(range(256))
         self.reopen()
         ends = self.now() + boot_s
         ping = self.prepare(write(0, IDENTITY), read(0, 10))
@@ -173,7 +172,6 @@ class SerialBus:
                 self._port = serial.Serial(
                     self.name,
                     self.baud,
-                    timeout=0,
                     write_timeout=self.timeout_s,
                     exclusive=True,
                 )
@@ -219,15 +217,16 @@ class SerialBus:
     def _ask(self, pointer: int, ends: float) -> bytes:
         """The register at a pointer, or nothing if no intact answer comes by the time
         `ends`."""
-        self._tag = (self._tag + 1) % 256
+        tag = bytes([next(self._tags)])
         self._heard = False
+        """Some bytes have come since the last request."""
         # What came before the request is no answer to it.
         self._received.clear()
         self._port.read(self._port.in_waiting)
-        self._port.write(encode(sealed(bytes([pointer, self._tag]))))
+        self._port.write(encode(sealed(bytes([pointer]) + tag)))
         while (packet := self._packet(ends)) is not None:
             # An answer to an earlier request that came too late has another tag.
-            if packet[:1] == bytes([self._tag]):
+            if packet[:1] == tag:
                 return packet[1:]
             if self.now() > ends:
                 break

@@ -60,7 +60,7 @@ class TCA9548A:
         self.control: int | None = None
         """The control byte, a bit for each connected channel; None where it is
         unknown."""
-        self._write = bus.prepare(write(address, [0]))
+        self._write = bus.prepare(write(address, bytes(1)))
         self._read = bus.prepare(read(address, 1))
         self._beside = beside
         self.select(None)

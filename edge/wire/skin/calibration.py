@@ -12,7 +12,7 @@ import numpy as np
 from edge.arrays import Booleans, Counts, Floats, Integers
 from edge.errors import InputError
 from edge.files import read_text
-from edge.wire.skin.decoder import dead_band
+from edge.wire.skin.decoder import dead_band, taxel_map
 from edge.wire.skin.file import SkinFile, TaxelCalibration, parse
 from edge.wire.skin.loop import Loop
 from edge.wire.skin.skin import Skin
@@ -94,7 +94,7 @@ def deaf_taxels(skin: SkinFile) -> list[tuple[int, int]]:
         return []
     noise = 0.0 if skin.calibration is None else skin.calibration.noise
     band = dead_band(skin.signal, noise)
-    return places((band >= threshold) & skin.layout.alive)
+    return places((band >= threshold) & skin.working)
 
 
 def places(mask: Booleans) -> list[tuple[int, int]]:
@@ -204,22 +204,20 @@ def unusable(
         baseline: (rows, cols) rest values.
         share: (rows, cols) shares of frames in which a taxel was valid.
     """
-    rest = baseline.ravel()
-    bad = share.ravel() < MIN_SHARE
-    served = np.zeros(rest.size, dtype=bool)
+    bad = share < MIN_SHARE
     for chip in file.chips:
-        taxels = chip.served
-        served[taxels] = True
-        bad[taxels] |= rest[taxels] >= chip.traits.highest
+        rest = baseline.flat[chip.served]
+        bad.flat[chip.served] |= rest >= chip.traits.highest
         if not chip.kind.rests_at_zero:
-            bad[taxels] |= rest[taxels] == 0
-    return np.asarray((served & bad).reshape(baseline.shape) & file.layout.alive)
+            bad.flat[chip.served] |= rest == 0
+    return bad & file.working
 
 
-def noisiest_taxels(noise: Floats) -> list[tuple[int, int]]:
-    """Taxels (row, col) that vary far more than the others, the worst first."""
-    limit = NOISY * float(np.median(noise)) + NOISY_COUNTS
-    return sorted(places(noise > limit), key=lambda taxel: -noise[taxel])
+def noisiest_taxels(file: SkinFile, noise: Floats) -> list[tuple[int, int]]:
+    """Working taxels (row, col) that vary far more than the others, the worst first."""
+    limit = NOISY * float(np.median(noise[file.working])) + NOISY_COUNTS
+    restless = places((noise > limit) & file.working)
+    return sorted(restless, key=lambda taxel: -noise[taxel])
 
 
 def standing_out(file: SkinFile, baseline: Counts) -> Integers:
@@ -229,13 +227,13 @@ def standing_out(file: SkinFile, baseline: Counts) -> Integers:
     A skin that is covered as a whole is not noticed.
     """
     change = np.zeros(baseline.size, dtype=np.int64)
+    signs = taxel_map(file).sign
     for kind in {chip.kind for chip in file.chips}:
-        chips = [chip for chip in file.chips if chip.kind is kind]
-        taxels = np.concatenate([chip.served for chip in chips])
-        signs = np.concatenate([[chip.sign] * len(chip.served) for chip in chips])
-        rest = baseline.ravel()[taxels].astype(np.int64)
-        middle = int(np.median(rest))
-        above = (rest - middle) * signs
-        usual = int(SPREADS * np.median(np.abs(above)))
-        change[taxels] = np.maximum(above - usual, 0)
-    return np.where(file.layout.alive, change.reshape(baseline.shape), 0)
+        served = [i for c in file.chips if c.kind is kind for i in c.served]
+        taxels = np.intersect1d(served, np.flatnonzero(file.working))
+        if taxels.size:
+            rest = baseline.ravel()[taxels].astype(np.int64)
+            above = (rest - int(np.median(rest))) * signs[taxels]
+            usual = int(SPREADS * np.median(np.abs(above)))
+            change[taxels] = np.maximum(above - usual, 0)
+    return change.reshape(baseline.shape)

@@ -76,9 +76,7 @@ def taxel_map(file: SkinFile) -> TaxelMap:
         reach = file.signal.saturation_counts + file.signal.drift_limit_counts
         lowest = rest - reach
         highest = np.minimum(highest, rest + reach)
-    served = chip_of >= 0
-    for row, col in file.signal.dead:
-        served[row * file.layout.cols + col] = False
+    served = file.working.ravel()
     return TaxelMap(stage, chip_of, sign, lowest, highest, served)
 
 

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from edge.arrays import Counts, Floats
+from edge.arrays import Booleans, Counts, Floats
 from edge.config import ConfigTable, limited, parse_toml
 from edge.errors import InputError
 from edge.files import read_text
@@ -94,6 +94,11 @@ class SkinFile:
     labels: Mapping[str, Sequence[str]] = field(default_factory=dict)
     """{task: the labels that a person may choose from}."""
 
+    def __post_init__(self) -> None:
+        """Refuse a skin of which nothing works."""
+        if not self.working.any():
+            raise InputError(f"{self.path}: all taxels that have a chip are dead")
+
     @property
     def chips(self) -> list[ChipSpec]:
         """All chips, bus by bus."""
@@ -103,6 +108,15 @@ class SkinFile:
     def served(self) -> list[int]:
         """The flat indices of the taxels that have a chip."""
         return [taxel for chip in self.chips for taxel in chip.served]
+
+    @property
+    def working(self) -> Booleans:
+        """(rows, cols), True on the taxels that have a chip and are not dead."""
+        has_chip = np.zeros(self.layout.shape, dtype=np.bool_)
+        has_chip.flat[self.served] = True
+        for taxel in self.signal.dead:
+            has_chip[taxel] = False
+        return has_chip & self.layout.alive
 
 
 def load(path: str | os.PathLike[str]) -> SkinFile:

@@ -14,6 +14,12 @@ static ec_calibration measured;
 
 typedef uint64_t key(uint32_t i, const void *about);
 
+static uint32_t count(key *of, const void *about) {
+  uint32_t n = 0;
+  for (uint32_t i = 0; i < EC_TAXELS; i++) n += of(i, about) != UINT64_MAX;
+  return n;
+}
+
 /* The key of a rank, from 0; those of UINT64_MAX do not count. Doubles that are not negative have the
    order of their bits. */
 static uint64_t kth(key *of, const void *about, uint32_t k) {
@@ -35,6 +41,7 @@ static uint64_t kth(key *of, const void *about, uint32_t k) {
 static uint64_t noise_bits(uint32_t i, const void *about) {
   uint64_t bits;
   (void)about;
+  if (!ec_working[i]) return UINT64_MAX;
   memcpy(&bits, &squares[i].noise, sizeof bits);
   return bits;
 }
@@ -66,8 +73,7 @@ static uint64_t away_of(uint32_t i, const void *about) {
 }
 
 static int32_t twice_median(key *of, const of_kind *those) {
-  uint32_t n = 0;
-  for (uint32_t i = 0; i < EC_TAXELS; i++) n += those->kinds[i] == those->kind;
+  uint32_t n = count(of, those);
   if (!n) return 0;
   return (int32_t)(kth(of, those, (n - 1) / 2) + kth(of, those, n / 2));
 }
@@ -131,7 +137,7 @@ static bool all_readable(uint16_t frames) {
     const ec_chip *chip = &ec_chips[c];
     for (uint16_t i = 0; i < chip->stages; i++) {
       int16_t taxel = chip->taxels[i];
-      if (taxel < 0 || !ec_skin_alive[taxel]) continue;
+      if (taxel < 0 || !ec_working[taxel]) continue;
       uint16_t rest = measured.rest[taxel];
       if (2 * valid[taxel] < frames || rest >= chip->highest) return false;
       if (rest == 0 && !chip->rests_at_zero) return false;
@@ -141,7 +147,8 @@ static bool all_readable(uint16_t frames) {
 }
 
 static bool any_restless(void) {
-  double median = (noise_of_rank((EC_TAXELS - 1) / 2) + noise_of_rank(EC_TAXELS / 2)) / 2.0;
+  uint32_t n = count(noise_bits, NULL);
+  double median = (noise_of_rank((n - 1) / 2) + noise_of_rank(n / 2)) / 2.0;
   for (uint32_t i = 0; i < EC_TAXELS; i++) {
     if (squares[i].noise > EC_NOISY * median + EC_NOISY_COUNTS) return true;
   }
@@ -152,13 +159,15 @@ static bool any_restless(void) {
 static void find_changes(int32_t changes[EC_TAXELS]) {
   for (uint32_t i = 0; i < EC_TAXELS; i++) {
     int32_t moved = measured.rest[i] - ec_calibration_now.rest[i];
-    changes[i] = ec_calibration_now.is_known ? (moved < 0 ? -moved : moved) : 0;
+    bool counts = ec_calibration_now.is_known && ec_working[i];
+    changes[i] = counts ? (moved < 0 ? -moved : moved) : 0;
   }
   if (ec_calibration_now.is_known) return;
-  static uint8_t kinds[EC_TAXELS]; /* and 1; 0: none */
+  static uint8_t kinds[EC_TAXELS]; /* of what works, and 1; 0: none */
   for (uint16_t c = 0; c < EC_CHIPS; c++) {
     for (uint16_t i = 0; i < ec_chips[c].stages; i++) {
-      if (ec_chips[c].taxels[i] >= 0) kinds[ec_chips[c].taxels[i]] = (uint8_t)(ec_chips[c].kind + 1);
+      int16_t taxel = ec_chips[c].taxels[i];
+      if (taxel >= 0 && ec_working[taxel]) kinds[taxel] = (uint8_t)(ec_chips[c].kind + 1);
     }
   }
   for (uint16_t c = 0; c < EC_CHIPS; c++) {
@@ -170,7 +179,7 @@ static void find_changes(int32_t changes[EC_TAXELS]) {
     int32_t usual = EC_STANDING_OUT * twice_median(away_of, &those) / 2;
     for (uint32_t i = 0; i < EC_TAXELS; i++) {
       int32_t beyond = (measured.rest[i] - those.middle) * ec_signs[i] - usual;
-      if (kinds[i] == those.kind && ec_skin_alive[i] && beyond > 0) changes[i] = beyond;
+      if (kinds[i] == those.kind && beyond > 0) changes[i] = beyond;
     }
   }
 }
@@ -178,7 +187,7 @@ static void find_changes(int32_t changes[EC_TAXELS]) {
 /* Whether taxels side by side have moved as under a touch. */
 static bool any_touched(void) {
   static int32_t changes[EC_TAXELS];
-  int32_t limit = ec_calibration_now.is_known && EC_SKIN_THRESHOLD ? EC_SKIN_THRESHOLD : EC_SKIN_ONSET;
+  int32_t limit = ec_calibration_now.is_known && EC_SKIN_THRESHOLD > 0 ? EC_SKIN_THRESHOLD : EC_SKIN_ONSET;
   if (EC_SKIN_ONSET == 0) return false;
   find_changes(changes);
   for (uint32_t i = 0; i < EC_TAXELS; i++) {
@@ -194,7 +203,7 @@ static bool any_touched(void) {
 
 static bool any_deaf(void) {
   for (uint32_t i = 0; EC_SKIN_THRESHOLD && i < EC_TAXELS; i++) {
-    if (ec_skin_alive[i] && dead_band(squares[i].noise) >= EC_SKIN_THRESHOLD) return true;
+    if (ec_working[i] && dead_band(squares[i].noise) >= EC_SKIN_THRESHOLD) return true;
   }
   return false;
 }

@@ -17,7 +17,8 @@ static bool decoded(uint8_t request[4]) {
     if (end > filled || end <= at) return false;
     for (at++; at < end && n < 4; at++) request[n++] = packet[at];
     if (at < end) return false;
-    if (at < filled && n < 4) request[n++] = 0;
+    if (at < filled && n == 4) return false;
+    if (at < filled) request[n++] = 0;
   }
   return n == 4 && ec_crc16(request, 4) == 0;
 }

@@ -39,7 +39,7 @@ static uint32_t older(uint32_t age, uint32_t by) { return age > NEVER - 1 - by ?
 
 /* The values of a chip's stages, and which are intact. */
 static void parse_ad7147(const uint8_t *bytes, uint16_t values[12], bool intact[12]) {
-  bool is_one = (bytes[24] << 8 | bytes[25]) >> 4 == EC_AD7147_IDENTITY;
+  bool is_one = (bytes[24] << 8 | bytes[25]) >> 4 == EC_IDENTITY;
   bool others = false;
   for (int i = 11; i >= 0; i--) {
     values[i] = (uint16_t)(bytes[2 * i] << 8 | bytes[2 * i + 1]);
@@ -59,7 +59,7 @@ static uint16_t unpacked(const uint8_t *bytes, uint32_t i, uint8_t bits) {
 }
 
 /* Values of the taxels of a chip into ec_raw, and whether each is intact into ec_read; whether all that
-   are served are. */
+   work are. */
 static bool decode(const ec_chip *chip) {
   const uint8_t *bytes = ec_bytes + chip->first_byte;
   const ec_calibration *rest = &ec_calibration_now;
@@ -77,7 +77,7 @@ static bool decode(const ec_chip *chip) {
       is_intact = intact[i];
     } else if (EC_HAS_MPR121 && chip->kind == EC_MPR121) {
       value = (uint16_t)(bytes[2 * i] | bytes[2 * i + 1] << 8);
-      is_intact = value != 0 && value < EC_MPR121_SATURATED;
+      is_intact = value != 0 && value < EC_SATURATED;
     } else if (EC_HAS_BLOCK) {
       value = unpacked(bytes + 2, i, chip->bits);
     }
@@ -87,8 +87,8 @@ static bool decode(const ec_chip *chip) {
       is_intact &= -EC_REACH <= away && away <= EC_REACH;
     }
     ec_raw[taxel] = value;
-    ec_read[taxel] = is_intact && ec_served[taxel];
-    all &= is_intact || !ec_served[taxel];
+    ec_read[taxel] = is_intact && ec_working[taxel];
+    all &= is_intact || !ec_working[taxel];
   }
   return all;
 }
@@ -120,8 +120,7 @@ static uint8_t beside(int32_t row, int32_t col, uint8_t mask, uint8_t bits) {
   uint8_t count = 0;
   for (int32_t r = row - 1; r <= row + 1; r++) {
     for (int32_t c = col - 1; c <= col + 1; c++) {
-      int32_t at = c;
-      if (EC_SKIN_WRAPS && EC_SKIN_COLS > 2) at = (c + EC_SKIN_COLS) % EC_SKIN_COLS;
+      int32_t at = EC_SKIN_WRAPS && EC_SKIN_COLS > 2 ? (c + EC_SKIN_COLS) % EC_SKIN_COLS : c;
       bool is_inside = r >= 0 && r < EC_SKIN_ROWS && at >= 0 && at < EC_SKIN_COLS;
       if (!is_inside || (r == row && at == col)) continue;
       count = (uint8_t)(count + ((states[r * EC_SKIN_COLS + at] & mask) == bits));
@@ -133,11 +132,11 @@ static uint8_t beside(int32_t row, int32_t col, uint8_t mask, uint8_t bits) {
 /* Find taxels that are broken: above the threshold alone, for longer than a touch. */
 static void follow_lone(uint64_t t, uint32_t since) {
   for (uint32_t i = 0; i < EC_TAXELS; i++) {
-    bool above = ec_read[i] && counts[i] > EC_TOUCH_COUNTS;
+    bool touched = ec_read[i] && counts[i] > EC_TOUCH_COUNTS;
     states[i] &= BROKEN | AT_START;
     if (ec_read[i]) states[i] |= VALID;
-    if (above && !(states[i] & BROKEN)) states[i] |= ACTIVE;
-    silent_for[i] = above ? 0 : silent_for[i] == NEVER ? NEVER : older(silent_for[i], since);
+    if (touched && !(states[i] & BROKEN)) states[i] |= ACTIVE;
+    silent_for[i] = touched ? 0 : silent_for[i] == NEVER ? NEVER : older(silent_for[i], since);
   }
   for (uint32_t i = 0; i < EC_TAXELS; i++) {
     int32_t row = (int32_t)(i / EC_SKIN_COLS);
@@ -171,7 +170,7 @@ static void follow_drift(uint32_t i) {
   int32_t rest = ec_calibration_now.rest[i] * SCALE;
   int32_t error = floored(ec_raw[i] * SCALE - baseline[i] + FOLLOW / 2, FOLLOW);
   int32_t moved = baseline[i] + clipped(error, -EC_DRIFT_STEP, EC_DRIFT_STEP);
-  baseline[i] = clipped(moved, rest - EC_DRIFT_LIMIT * SCALE, rest + EC_DRIFT_LIMIT * SCALE);
+  baseline[i] = clipped(moved, rest - EC_DRIFT_LIMIT_COUNTS * SCALE, rest + EC_DRIFT_LIMIT_COUNTS * SCALE);
 }
 
 static void assemble(uint64_t t) {

@@ -3,8 +3,7 @@
 
 const uint8_t ec_retries[] = $retries;
 const uint16_t ec_first_chips[] = $first_chips;
-const bool ec_skin_alive[] = $alive;
-const bool ec_served[] = $served;
+const bool ec_working[] = $working;
 const int8_t ec_signs[] = $signs;
 const ec_calibration ec_exported = $calibration;
 static const ec_script scripts[] = $scripts;

@@ -43,9 +43,8 @@ typedef struct {
 extern const ec_chip ec_chips[];
 extern const uint16_t ec_first_chips[]; /* of each bus, and of none */
 extern const uint8_t ec_retries[]; /* after each outcome */
-extern const bool ec_skin_alive[]; /* not dead by [skin] */
 extern const int8_t ec_signs[]; /* of each taxel: 1 where a touch raises its value, -1 where it lowers it */
-extern const bool ec_served[]; /* has a chip, and is not dead by [signal] */
+extern const bool ec_working[]; /* has a chip, and is not dead */
 
 /* Rest values, and what follows from the noise around them. */
 typedef struct {

@@ -26,7 +26,7 @@ with np.errstate():  # to import it makes numpy raise errors
     import emlearn
 
 HERE = Path(__file__).parent / "microcontroller"
-GCC = "-std=c99 -O2 -ffp-contract=off -ffunction-sections -fdata-sections -Wl,--gc-sections"
+GCC = "-std=c99 -Os -ffp-contract=off -ffunction-sections -fdata-sections -Wl,--gc-sections"
 STEPS = 2900
 """Of the range of a feature: with more, squared distances over 120 features reach 2^30,
 where emlearn's k-NN never ends."""

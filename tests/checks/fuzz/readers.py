@@ -28,7 +28,7 @@ from tests.train.importers.ros import (
     write_bag,
     write_mcap,
 )
-from tests.train.importers.test_importers import dsa
+from tests.train.importers.test_sdh2 import dsa
 from train.__main__ import main as train_main
 from train.simulate.scene import load as load_scene
 

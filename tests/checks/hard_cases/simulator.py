@@ -5,7 +5,45 @@ from hypothesis import strategies as st
 
 from tests.checks.hard_cases.cases import Case, Ladder, decades, powers_of_ten
 from tests.train.simulate.scenes import Law, Trace, slider
-from tests.train.simulate.test_simulate_stability import SPEED, judge
+from train.simulate.contact import GRAVITY
+
+ARM_K = 115.0
+SPEED = 0.15
+
+
+def judge(trace, stiffness, mass, mu_s, mu_k):
+    """The laws that a trace breaks, as complaints."""
+    force = trace.force
+    moved = np.diff(trace.slide, axis=0, prepend=0.0)
+    if not all(np.isfinite(v).all() for v in trace):
+        return ["not finite"]
+    hold = mu_s * mass * GRAVITY
+    stuck = np.cumsum(moved > 0.0, axis=0) == 0
+    # In the arm's spring and the bed's the force is the same.
+    gap = np.abs(ARM_K * (trace.target - trace.q) - force)
+    most = ARM_K * np.maximum(trace.target, 0.0)
+    # The target's motion at fixed q puts energy in; after that nothing may add any.
+    bed = 0.5 * force**2 / stiffness
+    moving = 0.5 * mass * trace.speed**2
+    q0, bed0, moving0 = (
+        np.pad(a[:-1], ((1, 0), (0, 0))) for a in (trace.q, bed, moving)
+    )
+    before = bed0 + moving0 + 0.5 * ARM_K * (trace.target - q0) ** 2
+    after = bed + moving + 0.5 * ARM_K * (trace.target - trace.q) ** 2
+    friction = mu_k * mass * GRAVITY * moved
+    lost = before - after - friction
+    scale = before + after + friction
+    complaints = {
+        "a force pulls": force < 0.0,
+        "no force though pressed": force[trace.target > trace.slide] <= 0.0,
+        "more force than the arm can give": force > most * (1 + 1e-12),
+        "arm and contact disagree": gap > 1e-12 * ARM_K * np.abs(trace.target),
+        "creeps in stick": trace.slide[stuck] != 0.0,
+        "sticks under more than it holds": (force > hold * (1 + 1e-12)) & stuck,
+        "energy made": lost < -1e-12 * scale,
+        "friction gives energy": friction < 0.0,
+    }
+    return [complaint for complaint, where in complaints.items() if where.any()]
 
 
 def push_error(h, mu, steps=120):

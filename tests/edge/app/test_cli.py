@@ -10,7 +10,6 @@ from pathlib import Path
 
 import pytest
 
-from edge import __version__
 from edge.__main__ import main as start
 from edge.app import cli
 from edge.demo import MODEL
@@ -142,10 +141,6 @@ def test_a_stream_that_was_closed_before_the_start_is_no_traceback(closed, tmp_p
     assert "Traceback" not in Path(f"{log}.err").read_text()
 
 
-def test_the_version_is_the_package_s():
-    assert python("-m", "edge", "--version").stdout == f"edge-classify {__version__}\n"
-
-
 EMPTY = [
     *([name, ""] for name in cli.COMMANDS),
     ["install", str(MODEL), "--to", ""],
@@ -187,17 +182,3 @@ def test_a_model_and_a_skin_may_stand_without_their_option(words, edge):
         answers.append((status, re.sub(r'"latency_ms": [\d.]+', "", out)))
     assert answers[0] == answers[1]
     assert answers[0][0] < 2
-
-
-@pytest.mark.parametrize(
-    ("words", "sentence"),
-    [
-        (["verify"], "a model is required: name its file"),
-        (["verify", "a.onnx", "b.onnx"], "unrecognized arguments: b.onnx"),
-        (["verify", "a.onnx", "--skin"], "unrecognized arguments: --skin"),
-    ],
-)
-def test_a_command_without_its_model_or_with_two_says_so(words, sentence, capsys):
-    with pytest.raises(SystemExit):
-        cli.main(words)
-    assert sentence in capsys.readouterr().err

@@ -30,9 +30,12 @@ from edge.touch.arm import Chain
             ["run", "--seconds", "soon"],
             "--seconds: must be a number from 0.001 to 1e+09",
         ),
+        (["verify"], "a model is required: name its file"),
+        (["verify", "a.onnx", "b.onnx"], "unrecognized arguments: b.onnx"),
+        (["verify", "a.onnx", "--skin"], "unrecognized arguments: --skin"),
     ],
 )
-def test_a_value_that_an_option_does_not_take_is_refused(options, sentence, capsys):
+def test_words_that_a_command_does_not_take_are_refused(options, sentence, capsys):
     with pytest.raises(SystemExit, match="2"):
         main(options)
     assert sentence in capsys.readouterr().err

@@ -35,20 +35,20 @@ def test_a_touch_is_unsure_wrong_or_unlabelled(meta, kinds):
     assert review.kinds(meta, meta["labels"]) == kinds
 
 
-def test_what_is_unknown_or_out_of_range_is_not_accepted():
-    meta = kept_meta({}, a=("x", 0.9), b=("unknown", 0.9), c=(None, None))
-    assert review.accepted(meta, {}) == {"a": "x"}
+JOINT = {"category": ("rigid-fixed", 0.9), "mobility": ("fixed", 0.9)}
 
 
-def test_what_a_person_has_labelled_is_not_accepted_otherwise():
-    meta = kept_meta({}, a=("x", 0.9), b=("z", 0.9))
-    assert review.accepted(meta, {"a": "y"}) == {"b": "z"}
-
-
-def test_what_is_accepted_contradicts_no_label_of_a_person():
-    meta = kept_meta({}, category=("rigid-fixed", 0.9), mobility=("fixed", 0.9))
-    assert review.accepted(meta, HALVES) == {}
-    assert review.accepted(meta, {"softness": "soft"}) == {"mobility": "fixed"}
+@pytest.mark.parametrize(
+    ("answers", "labels", "accepted"),
+    [
+        ({"a": ("x", 0.9), "b": ("unknown", 0.9), "c": (None, None)}, {}, {"a": "x"}),
+        ({"a": ("x", 0.9), "b": ("z", 0.9)}, {"a": "y"}, {"b": "z"}),
+        (JOINT, HALVES, {}),
+        (JOINT, {"softness": "soft"}, {"mobility": "fixed"}),
+    ],
+)
+def test_what_is_accepted_is_known_and_contradicts_no_label(answers, labels, accepted):
+    assert review.accepted(kept_meta({}, **answers), labels) == accepted
 
 
 def touched(meta, labels):

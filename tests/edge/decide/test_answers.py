@@ -11,7 +11,7 @@ from edge.decide.classifier import Classifier
 from edge.decide.model import Model
 from edge.errors import InputError
 from tests.edge.decide.test_classifier import decided, decisions
-from tests.edge.decide.test_joint_doubts import RATE, series, stopped
+from tests.edge.decide.test_doubts import RATE, of_joints, stopped
 
 
 def without_a_pose(touch):
@@ -83,7 +83,7 @@ def test_frames_that_repeat_are_a_doubt_unless_those_of_training_did(model, repe
     contact = SimpleNamespace(
         missing_taxels=False, missing_pose=False, late=True, chain=None
     )
-    felt = series(lambda t: 0.5 * RATE * t)
+    felt = of_joints(lambda t: 0.5 * RATE * t)
     held = replace(felt, same=felt.t > 0.0)
     info = replace(model.info, repeats=repeats, onset="first" * repeats)
     doubts = contact_doubts(info, contact, held, 1.2)
@@ -97,9 +97,9 @@ def test_joint_angles_are_compared_with_those_of_training(model):
     )
     usual = {"joints": 2, "still_s": (0.0, 0.0), "speeds": (0.4, 0.6)}
     info = replace(model.info, **usual)
-    doubts = contact_doubts(info, contact, series(lambda t: 0.5 * RATE * t), 1.2)
+    doubts = contact_doubts(info, contact, of_joints(lambda t: 0.5 * RATE * t), 1.2)
     assert doubts["speed"]
     assert not doubts["still_joints"]
-    doubts = contact_doubts(info, contact, series(stopped(0, 0.5)), 1.2)
+    doubts = contact_doubts(info, contact, of_joints(stopped(0, 0.5)), 1.2)
     assert doubts["still_joints"]
     assert not doubts["speed"]

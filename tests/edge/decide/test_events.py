@@ -26,7 +26,7 @@ def test_an_event_is_what_a_line_of_json_says():
         "label": "a",
         "confidence": 0.5,
         "flags": ["unsure"],
-        "place": None,
+        "position": None,
         "onset_s": 0.25,
         "window_s": 1.2,
         "latency_ms": 0.3,

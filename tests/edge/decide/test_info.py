@@ -55,17 +55,19 @@ def test_the_fastest_rule_that_is_certified_is_taken():
 
 
 @pytest.mark.parametrize(
-    ("point", "evidence", "odds"),
-    [(0, 1.0, math.e), (2, -1.0, math.exp(-3)), (0, 1e300, 1e300)],
+    ("point", "evidence", "excess", "odds"),
+    [
+        (0, 1.0, 0.0, math.e),
+        (2, -1.0, 0.0, math.exp(-3)),
+        (0, 1e300, 0.0, 1e300),
+        (0, 0.0, 0.5, 1.0),
+        (1, 0.0, 0.5, math.exp(-0.5)),
+    ],
 )
-def test_confidence_is_the_logistic_function_of_the_margin(point, evidence, odds):
-    confidence = stopping().confidence(point, [0.0, evidence], 0, excess=0.0)
-    assert confidence == pytest.approx(odds / (1 + odds))
-
-
-@pytest.mark.parametrize(("point", "odds"), [(0, 1.0), (1, math.exp(-0.5))])
-def test_novelty_lowers_the_log_odds_by_the_doubt(point, odds):
-    confidence = stopping().confidence(point, [0.0, 0.0], 0, excess=0.5)
+def test_confidence_is_the_logistic_function_of_the_margin_less_the_doubt(
+    point, evidence, excess, odds
+):
+    confidence = stopping().confidence(point, [0.0, evidence], 0, excess=excess)
     assert confidence == pytest.approx(odds / (1 + odds))
 
 
@@ -105,39 +107,44 @@ def table(stored):
     return ConfigTable(asdict(stored), "model.onnx", "stopping.t.")
 
 
+def of_three(**changes):
+    """The rules of three decision points, read again."""
+    return read_stopping(table(stopping(**changes)), 3)
+
+
+def of_two(**changes):
+    """The limits of two."""
+    return read_remoteness(table(replace(REMOTENESS, **changes)), 2)
+
+
 def test_what_is_stored_is_read_again():
-    assert read_stopping(table(stopping()), 3) == stopping()
-    assert read_remoteness(table(REMOTENESS), 2) == REMOTENESS
+    assert of_three() == stopping()
+    assert of_two() == REMOTENESS
 
 
 @pytest.mark.parametrize(
-    ("changes", "says"),
+    ("read", "changes", "says"),
     [
-        ({"slopes": (1.0, 1.0)}, "slopes must be a list of 3 numbers"),
-        ({"slopes": (1.0, 1e308, 1.0)}, "slopes must be a number from 1e-12 to 1e"),
+        (of_three, {"slopes": (1.0, 1.0)}, "slopes must be a list of 3 numbers"),
         (
+            of_three,
+            {"slopes": (1.0, 1e308, 1.0)},
+            "slopes must be a number from 1e-12 to 1e",
+        ),
+        (
+            of_three,
             {"rules": (StoppingRule(0.1, 1.0, 0.9, 3),)},
             "rules 0: last must be .* 0 to 2, not 3",
         ),
-        ({"wrong": 141}, "wrong must be a whole number from 0 to 140, not 141"),
+        (of_three, {"wrong": 141}, "wrong must be a whole number from 0 to 140, not"),
+        (of_two, {"limits": (1.0,)}, "limits must be a list of 2 numbers, not"),
+        (of_two, {"slopes": (1.0, -1.0)}, "slopes must be a number of at least 0, not"),
+        (of_two, {"worth": {"sure": 1.5}}, "worth.sure must be a number from 0 to 1,"),
     ],
 )
-def test_what_contradicts_itself_is_no_stopping(changes, says):
+def test_what_contradicts_itself_is_refused(read, changes, says):
     with pytest.raises(InputError, match=f"model.onnx: stopping.t.{says}"):
-        read_stopping(table(stopping(**changes)), 3)
-
-
-@pytest.mark.parametrize(
-    ("changes", "says"),
-    [
-        ({"limits": (1.0,)}, "limits must be a list of 2 numbers, not"),
-        ({"slopes": (1.0, -1.0)}, "slopes must be a number of at least 0, not -1.0"),
-        ({"worth": {"sure": 1.5}}, "worth.sure must be a number from 0 to 1, not 1.5"),
-    ],
-)
-def test_damaged_limits_are_refused(changes, says):
-    with pytest.raises(InputError, match=says):
-        read_remoteness(table(replace(REMOTENESS, **changes)), 2)
+        read(**changes)
 
 
 @pytest.mark.parametrize(

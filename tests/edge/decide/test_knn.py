@@ -181,11 +181,16 @@ def assert_equal(answers, expected):
         assert answers[name].tobytes() == expected[name].tobytes(), name
 
 
+def one_by_one(model, vectors, point):
+    """The outputs for vectors that a model is given alone."""
+    rows = [model.run(vector[None], point) for vector in vectors]
+    return {name: np.concatenate([row[name] for row in rows]) for name in rows[0]}
+
+
 def assert_alike(runtime, numpy, vectors, point):
     """Two engines refuse the same vectors, and answer the others with the same bits,
     whether they come one by one or together."""
-    rows = [runtime.run(vector[None], point) for vector in vectors]
-    expected = {name: np.concatenate([row[name] for row in rows]) for name in rows[0]}
+    expected = one_by_one(runtime, vectors, point)
     answers = numpy.run(vectors, point)
     assert answers.keys() == expected.keys()
     labels = [f"{task}_label" for task in runtime.info.tasks]

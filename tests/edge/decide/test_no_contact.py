@@ -7,7 +7,6 @@ import pytest
 
 from edge.decide.classifier import Classifier
 from edge.decide.model import Model
-from tests.edge.decide.test_classifier import decided
 
 
 @pytest.fixture
@@ -56,12 +55,6 @@ def test_a_touch_too_weak_to_be_a_contact_is_flagged(model, still):
     strongest = decision.to_dict()["strongest"]
     assert strongest == round(weak.max() / layout.onset, 3)
     assert strongest < 1.0
-
-
-def test_a_contact_is_decided_as_ever(model, make_touch):
-    events = decided(model, make_touch())
-    assert [event.task for event in events] == ["category", "object"]
-    assert all(event.label != "none" for event in events)
 
 
 def test_no_frame_at_all_says_nothing(model):

@@ -99,12 +99,12 @@ def test_every_share_is_that_of_aeon_s_minirocket_with_the_same_kernels(
         np.array(table.biases, np.float32),
     )
     touch = kernels.shifted(values, table.shifts)[None].astype(np.float32)
-    (theirs,) = minirocket._static_transform_multi(
+    (of_aeon,) = minirocket._static_transform_multi(
         touch,
         parameters,
         np.array(HEAVY, np.int32),
     )
-    assert shares(values, table).astype(np.float32).tolist() == theirs.tolist()
+    assert shares(values, table).astype(np.float32).tolist() == of_aeon.tolist()
 
 
 def test_a_convolution_takes_the_same_channels_on_every_machine():

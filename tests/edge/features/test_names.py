@@ -3,7 +3,7 @@
 import pytest
 
 from edge.errors import InputError
-from edge.features.names import PAPER, feature_types, measures, names
+from edge.features.names import PAPER, feature_types, measures
 from edge.touch.layout import SkinLayout
 
 
@@ -31,8 +31,3 @@ def test_a_wrong_name_is_one_sentence(features, sentence):
     with pytest.raises(InputError, match=sentence) as caught:
         feature_types(tuple(features))
     assert "\n" not in str(caught.value)
-
-
-def test_the_papers_three_come_first():
-    assert PAPER == ("max_force", "contact_area", "contact_motion")
-    assert names()[:3] == [*PAPER]

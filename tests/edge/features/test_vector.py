@@ -71,9 +71,9 @@ def test_nothing_after_the_window_changes_its_features(seed, window_s):
     area[0] = 1
     peak = 100 * np.minimum(area, 1)
     n = int(np.searchsorted(t, window_s)) + 1
-    whole = feature_vector(series(t, peak, area, t), window_s)
+    complete = feature_vector(series(t, peak, area, t), window_s)
     so_far = feature_vector(series(t[:n], peak[:n], area[:n], t[:n]), window_s)
-    assert whole.tolist() == so_far.tolist()
+    assert complete.tolist() == so_far.tolist()
 
 
 def test_forty_samples_of_each_feature_from_onset_to_the_end_of_the_window():

@@ -94,10 +94,10 @@ def test_the_last_change_is_taken_back(day):
 
 def test_nobody_takes_back_what_another_has_changed_since(day):
     relabel(day)
-    mine = former(day)
+    first = former(day)
     relabel(day, "b.npz")
     with pytest.raises(InputError, match="have been changed since; look again"):
-        undo(mine)
+        undo(first)
     (day / TABLE).write_text("file,object\na.npz,by hand\n")
     with pytest.raises(InputError, match="written since by another program"):
         undo(former(day))

@@ -37,7 +37,7 @@ def test_what_a_model_could_not_hold_is_read_without_it_and_said(caplog):
     assert caplog.text.count("a.npz: the labels") == 1
 
 
-def written(folder, text):
+def write_table(folder, text):
     (folder / TABLE).write_bytes(text if isinstance(text, bytes) else text.encode())
     return folder
 
@@ -47,7 +47,7 @@ META = {"labels": {"object": "box", "softness": "hard"}}
 
 def test_a_row_wins_over_a_recordings_own_labels_in_the_columns_of_the_table(tmp_path):
     table = read_table(
-        written(tmp_path, "file,object,left_out\na.npz,cup,\nb.npz,,x\n")
+        write_table(tmp_path, "file,object,left_out\na.npz,cup,\nb.npz,,x\n")
     )
     assert table.standing("a.npz", META) == (
         {"object": "cup", "softness": "hard"},
@@ -61,25 +61,25 @@ def test_a_row_wins_over_a_recordings_own_labels_in_the_columns_of_the_table(tmp
 def test_what_is_left_out_is_said_in_the_words_of_spreadsheets(tmp_path):
     words = {"": 0, "no": 0, "False": 0, "0": 0, "Yes": 1, "TRUE": 1, "x": 1, "1": 1}
     lines = "".join(f"{number},{word}\n" for number, word in enumerate(words))
-    rows = read_table(written(tmp_path, f"file,left_out\n{lines}")).rows
+    rows = read_table(write_table(tmp_path, f"file,left_out\n{lines}")).rows
     assert [row.left_out for row in rows.values()] == list(words.values())
 
 
 def test_empty_cells_at_the_ends_of_lines_are_no_columns(tmp_path):
-    table = read_table(written(tmp_path, "file,\na.npz\n"))
+    table = read_table(write_table(tmp_path, "file,\na.npz\n"))
     assert table.standing("a.npz", META) == Standing(META["labels"])
 
 
 def test_a_spreadsheet_may_save_it_with_semicolons_and_a_mark(tmp_path):
     text = 'file;object;left_out;\r\na.npz;"Dose; groß";;\r\n;;;\r\nb.npz;x;WAHR;\r\n'
     with pytest.raises(InputError, match="line 4: left_out is yes or empty"):
-        read_table(written(tmp_path, text.encode("utf-8-sig")))
+        read_table(write_table(tmp_path, text.encode("utf-8-sig")))
     table = read_table(
-        written(tmp_path, text.replace("WAHR", "TRUE").encode("utf-8-sig"))
+        write_table(tmp_path, text.replace("WAHR", "TRUE").encode("utf-8-sig"))
     )
     assert table.standing("a.npz", {}) == Standing({"object": "Dose; groß"})
     again = read_table(
-        written(tmp_path, table.encoded({"a.npz": Standing({"a": "1"})}))
+        write_table(tmp_path, table.encoded({"a.npz": Standing({"a": "1"})}))
     )
     assert again.delimiter == ";"
     assert again.standing("a.npz", {}) == Standing({"a": "1"})
@@ -104,11 +104,11 @@ def test_a_spreadsheet_may_save_it_with_semicolons_and_a_mark(tmp_path):
 )
 def test_a_damaged_table_is_refused_with_its_line(tmp_path, text, sentence):
     with pytest.raises(InputError, match=rf"{TABLE}.*{sentence}"):
-        read_table(written(tmp_path, text))
+        read_table(write_table(tmp_path, text))
 
 
 def test_labels_of_contacts_are_not_overruled(tmp_path):
-    table = read_table(written(tmp_path, "file,object,left_out\na.npz,cup,yes\n"))
+    table = read_table(write_table(tmp_path, "file,object,left_out\na.npz,cup,yes\n"))
     meta = {"labels": {"object": "cup"}, "contacts": [{"object": "box"}]}
     assert table.standing("a.npz", meta).left_out
     with pytest.raises(InputError, match="the contacts of a.npz have labels of"):

@@ -225,13 +225,15 @@ def test_a_part_whose_name_is_damaged_or_unknown_is_refused_and_not_ignored(
 ):
     path = tmp_path / "a.npz"
     save(path, make_touch())
-    whole = path.read_bytes()
-    at = whole.rindex(b"joints.npy")
+    content = path.read_bytes()
+    at = content.rindex(b"joints.npy")
     for place in range(at, at + len("joints.npy")):
-        path.write_bytes(whole[:place] + bytes([whole[place] ^ 1]) + whole[place + 1 :])
+        path.write_bytes(
+            content[:place] + bytes([content[place] ^ 1]) + content[place + 1 :]
+        )
         with pytest.raises(InputError, match="a.npz: .*copy or record it again"):
             load(path)
-    path.write_bytes(whole)
+    path.write_bytes(content)
     with zipfile.ZipFile(path, "a") as archive, pytest.warns(match="Duplicate"):
         archive.writestr("joints.npy", archive.read("joints.npy"))
     with pytest.raises(InputError, match="has a part 'joints.npy', which no recording"):

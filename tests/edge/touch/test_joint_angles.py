@@ -5,7 +5,13 @@ import pytest
 
 from edge.errors import InputError
 from edge.touch.joint_angles import JointAngles, joint_columns
-from tests.edge.decide.test_joint_doubts import LAYOUT, RATE, doubts, moving, series
+from tests.edge.decide.test_doubts import (
+    LAYOUT,
+    RATE,
+    doubts_of_joints,
+    moving,
+    of_joints,
+)
 from tests.edge.touch.pressed import pressed
 
 
@@ -16,9 +22,9 @@ def test_joints_that_a_source_lacks_are_named_with_those_that_it_has():
 
 
 def test_the_speed_is_not_known_where_the_stream_begins_with_the_contact():
-    felt = series(moving, lead=5)
+    felt = of_joints(moving, lead=5)
     assert np.isnan(felt.speed)
-    assert doubts(felt) == set()
+    assert doubts_of_joints(felt) == set()
 
 
 def test_the_speed_is_not_known_where_angles_were_missing():

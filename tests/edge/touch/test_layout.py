@@ -14,8 +14,8 @@ CODY = skinfile.load(skinfile.shipped("cody")).layout
 
 def test_taxels_lie_where_those_of_the_real_forearm_lie(real):
     centres = np.load(real / "meka_forearm_taxel_array_16x24.npz")["centers"]
-    ours = np.array([[CODY.position(r, c) for c in range(24)] for r in range(16)])
-    assert np.abs(ours - centres).max() < 4e-6  # the digits of the skin's file
+    positions = np.array([[CODY.position(r, c) for c in range(24)] for r in range(16)])
+    assert np.abs(positions - centres).max() < 4e-6  # the digits of the skin's file
 
 
 def test_between_columns_the_shorter_way_round_is_taken():

@@ -61,10 +61,13 @@ def by_us(counts, threshold, valid, wraps):
     """The same from `find_regions` and `largest_region`."""
     options = {"valid": valid, "wraps": wraps}
     largest = largest_region(counts, threshold, **options)
-    both = find_regions(counts, threshold, **options), [largest] * (largest is not None)
+    answers = (
+        find_regions(counts, threshold, **options),
+        [largest] * (largest is not None),
+    )
     return tuple(
         [described(r.mask, r.area, r.peak, r.sums[0]) for r in regions]
-        for regions in both
+        for regions in answers
     )
 
 

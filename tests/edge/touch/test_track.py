@@ -7,8 +7,9 @@ import pytest
 
 from edge.errors import InputError
 from edge.touch.arm import Chain, Joint
+from edge.touch.frame import Frame
 from edge.touch.layout import SkinLayout
-from edge.touch.track import DEBOUNCE, ContactTracker, first_contact
+from edge.touch.track import DEBOUNCE, MAX_CONTACTS, ContactTracker, first_contact
 from tests.conftest import in_a_row
 from tests.edge.touch.pressed import followed, pressed
 
@@ -183,14 +184,14 @@ def test_the_first_of_two_contacts_is_given_whole(make_touch, forearm):
 def test_a_touch_begins_by_an_event_alone_before_it_is_felt():
     tracker = ContactTracker(FLAT, horizon_s=0.5)
     tracker.outside = True
-    contacts = []
+    touched = {*range(10), *range(40, 60)}
+    contacts = {}
     for i in range(120):
-        t = 0.01 * i
-        taxels = {(3, 3): 200} if i < 10 or 40 <= i < 60 else {}
-        frame = pressed(FLAT, t, taxels, onset=i in (20, 100))
-        contacts += [c for c in tracker.push(frame) if c not in contacts]
-    assert [contact.onset_s for contact in contacts] == pytest.approx([0.2, 1.0])
+        taxels = {(3, 3): 200 * (i in touched)}
+        frame = pressed(FLAT, 0.01 * i, taxels, onset=i in (20, 100))
+        contacts |= dict.fromkeys(tracker.push(frame))
     first, second = contacts
+    assert (first.onset_s, second.onset_s) == pytest.approx((0.2, 1.0))
     series = first.series()
     assert series.t[series.area > 0][0] == pytest.approx(0.2)
     assert first.ended
@@ -201,3 +202,71 @@ def test_a_touch_begins_by_an_event_alone_before_it_is_felt():
 def test_a_frame_without_shear_is_named():
     with pytest.raises(InputError, match="need shear, which a frame lacks"):
         followed(replace(FLAT, axes=3), [pressed(FLAT, 0.0, {})])
+
+
+LONG = SkinLayout(rows=6, cols=20, threshold_counts=10, onset_counts=20, release_s=0.05)
+
+
+MERGED, PARTED = ".######", "##.###"
+
+
+FLICKER = "/".join(["#." * 10, ".#" * 10] * 3)
+
+
+@pytest.mark.parametrize(
+    ("pictures", "areas", "ended"),
+    [
+        # Two regions are two contacts, also where the later one is larger.
+        (
+            ["##", "##", *["##....####"] * 2, "#.....####"],
+            [[2, 2, 2, 2, 1], [4, 4, 4]],
+            [0, 0],
+        ),
+        # A region that moves by its width goes on.
+        (["#", "#", ".#", "..#", "..#"], [[1] * 5], [0]),
+        # Where two grow into one, the older goes on and the other ends.
+        (
+            [".##", *[".##...##"] * 2, *[MERGED] * 5],
+            [[2, 2, 2, 6, 6, 6, 6, 6], [2, 2, 0, 0, 0, 0, 0]],
+            [0, 1],
+        ),
+        # Where one parts in two, the larger share goes on.
+        (["######", "######", PARTED, PARTED], [[6, 6, 3, 3], [2, 2]], [0, 0]),
+        # A region apart from where a contact was is another one.
+        (["##", "##", *["...##"] * 2], [[2, 2, 0, 0], [2, 2]], [0, 0]),
+        # A region below the onset count begins nothing.
+        (["++", "++", "++"], [], []),
+        # A contact ends by itself while another goes on.
+        (
+            [*["#....##"] * 2, *[".....##"] * 5],
+            [[2] * 7, [1, 1, 0, 0, 0, 0, 0]],
+            [0, 1],
+        ),
+        # A skin that flickers has no more than so many contacts.
+        ([FLICKER] * 3, [[1] * 3] * MAX_CONTACTS, [0] * MAX_CONTACTS),
+    ],
+)
+def test_each_region_is_a_contact_of_its_own(pictures, areas, ended):
+    """Pictures are rows of taxels: '#' has 100 counts, '+' 15, '.' none."""
+    tracks = ContactTracker(LONG, max_contacts=MAX_CONTACTS)
+    levels = {"#": 100, "+": 15, ".": 0}
+    for i, picture in enumerate(pictures):
+        counts = np.zeros(LONG.shape, dtype=np.uint16)
+        for r, row in enumerate(picture.split("/")):
+            counts[r, : len(row)] = [levels[taxel] for taxel in row]
+        contacts = list(tracks.push(Frame(i / 100, counts)))
+    assert [contact.series().area.tolist() for contact in contacts] == areas
+    assert [contact.ended for contact in contacts] == ended
+
+
+def test_a_place_is_the_centroid_turned_and_moved_by_the_arm():
+    layout = replace(LONG, pitch_m=0.01)
+    chain = Chain.cody()
+    joints = np.array([0.1, -0.2, 0.3, 0.4, -0.5])
+    tracks = ContactTracker(layout, chain=chain, max_contacts=2)
+    counts = np.zeros(LONG.shape, dtype=np.uint16)
+    counts[2, 3:5] = 100
+    for i in range(2):
+        (*_, contact) = [None, *tracks.push(Frame(i / 100, counts, joints=joints))]
+    expected = (chain.pose(joints) @ [0.035, 0.02, 0.0, 1.0])[:3]
+    assert contact.position() == pytest.approx(expected, abs=1e-15)

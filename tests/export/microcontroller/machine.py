@@ -19,8 +19,10 @@ VECTOR, VECTORS_OF_RECORDING, COSTS, SELFTEST, EVENTS_OF_RECORDING = range(5)
 ABOUT_ITSELF = struct.pack("<II", SELFTEST, 0)
 """The question whether `ec_selftest` passes."""
 WARNINGS = "-Wall -Wextra -Werror -Wconversion -Wdouble-promotion -pedantic"
-COMMON = f"-std=c99 -O2 -ffp-contract=off {WARNINGS}".split()
-SANITIZED = "-fsanitize=undefined,address -fno-sanitize-recover=all".split()
+COMMON = f"-std=c99 -Os -ffp-contract=off {WARNINGS}".split()
+DEFINED = "-fsanitize=undefined -fno-sanitize-recover=all".split()
+"""What C leaves undefined ends the program."""
+SANITIZED = [*DEFINED, "-fsanitize=address"]
 BOARDS = {
     "M0+": ("cortex-m0plus", "", "mps2-an385", 0x00000000, 0x20000000),
     "M4F": (

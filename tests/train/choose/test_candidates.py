@@ -52,17 +52,23 @@ def sets_of(known=False, quick=False, **words):
     return {c.sets for c in every if c.known == known}
 
 
-def test_features_of_joints_are_candidates_where_recordings_have_them():
-    assert sets_of() == set(PLAIN)
-    assert sets_of(joints=True) == set(WITH_JOINTS)
-    assert len(candidates(TASKS, FitOptions(quick=True), joints=True)) == 3
+WITH_BOTH = {(*sets, "joints") for sets in WITH_SHEAR}
 
 
-def test_features_of_shear_are_candidates_where_recordings_have_it():
-    with_joints = {(*sets, "joints") for sets in WITH_SHEAR}
-    assert sets_of(joints=True, shear=True) == {*WITH_JOINTS, *with_joints}
-    assert sets_of(shear=True) == {*PLAIN, *WITH_SHEAR}
-    assert sets_of(shear=True, quick=True) == {*PLAIN[:3], *WITH_SHEAR}
+@pytest.mark.parametrize(
+    ("words", "sets"),
+    [
+        ({}, {*PLAIN}),
+        ({"joints": True}, {*WITH_JOINTS}),
+        ({"joints": True, "shear": True}, {*WITH_JOINTS, *WITH_BOTH}),
+        ({"shear": True}, {*PLAIN, *WITH_SHEAR}),
+        ({"shear": True, "quick": True}, {*PLAIN[:3], *WITH_SHEAR}),
+    ],
+)
+def test_features_of_joints_and_shear_are_candidates_where_recordings_have_them(
+    words, sets
+):
+    assert sets_of(**words) == sets
 
 
 def test_each_group_of_features_is_tried_beside_every_other_for_known_things():

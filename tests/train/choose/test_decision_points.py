@@ -42,8 +42,8 @@ def test_a_model_has_the_decision_points_that_keep_it_small(
         candidates=(),
         window_s=1.2,
     )
-    taken, notes = usual_points(data, settings, 40)
-    assert taken == pytest.approx(points)
+    seconds, notes = usual_points(data, settings, 40)
+    assert seconds == pytest.approx(points)
     assert [note.split(" decision points")[0] for note in notes] == (
         [] if len(points) == 11 else ["no" if len(points) == 1 else str(len(points))]
     )

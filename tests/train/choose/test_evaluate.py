@@ -17,7 +17,7 @@ from train.choose.evaluate import (
 from train.choose.protocols import Protocol
 from train.choose.rule import MOST_ACCURATE, Rule
 from train.choose.search import SearchGrid
-from train.data.folds import group_folds, stratified_folds
+from train.data.folds import stratified_folds
 from train.data.vectors import Vectors
 from train.model.pipeline import Choice, ContactClassifier
 
@@ -115,12 +115,6 @@ def test_a_promise_is_as_wide_as_two_fifths_of_its_trials_make_it():
     assert NestedAccuracy(90, 100, variance=10.0).interval == wilson(9, 10)
 
 
-def test_folds_of_groups_part_no_group():
-    groups = np.repeat([f"{i}" for i in range(12)], 4)
-    few = group_folds(groups, count=5)
-    assert all(len(set(few[groups == name])) == 1 for name in groups)
-
-
 @pytest.mark.parametrize("most", [None, 2])
 def test_the_discriminants_of_two_tasks_may_be_set_side_by_side(most):
     """All of them, or the first of them."""
@@ -195,14 +189,6 @@ def test_a_graded_answer_that_is_wrong_counts_as_wrong():
     for candidate in range(len(plain.choices["t"])):
         places = [candidate] * 4
         assert table.answered("t", places) == plain.answered("t", places)
-
-
-def test_folds_spread_each_class_evenly():
-    y = np.repeat(["a", "b"], [30, 14])
-    folds = stratified_folds(y, 10)
-    assert sorted(np.bincount(folds[y == "a"])) == [3] * 10
-    assert np.bincount(folds).max() - np.bincount(folds).min() <= 1
-    assert (folds == stratified_folds(y, 10)).all()
 
 
 def test_what_cannot_be_parted_or_measured_is_one_sentence():

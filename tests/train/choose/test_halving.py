@@ -64,19 +64,19 @@ def test_what_is_dropped_without_a_fold_does_not_depend_on_its_labels(vectors):
     labels = vectors.y["t"].copy()
     labels[FOLDS == 3] = np.where(labels[FOLDS == 3] == "a", "b", "a")
     changed = replace(vectors, y={"t": labels})
-    running, other = (
+    running, afterwards = (
         evaluate(v, FOLDS, GRIDS, halving=Halving(by_price)).running["t"]
         for v in (vectors, changed)
     )
-    assert (running[3] == other[3]).all()
+    assert (running[3] == afterwards[3]).all()
 
 
 def test_tasks_that_share_their_settings_drop_what_is_behind_in_their_mean(vectors):
     """The second task's labels follow from no feature."""
     chance = np.array(["x", "y"])[np.arange(220) % 2]
-    both = replace(vectors, y={"t": vectors.y["t"], "u": chance})
+    of_two = replace(vectors, y={"t": vectors.y["t"], "u": chance})
     halving = Halving(lambda task, choices: Rule(), sharing=("t", "u"))
-    table = evaluate(both, FOLDS, GRIDS, halving=halving)
+    table = evaluate(of_two, FOLDS, GRIDS, halving=halving)
     assert (table.running["t"] == table.running["u"]).all()
     assert table.running["t"][:, :2].all()
     assert not table.running["t"][:, 4:].all()

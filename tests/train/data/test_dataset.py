@@ -6,10 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from edge.decide.classifier import Classifier
-from edge.decide.model import Model
 from edge.errors import InputError
-from edge.features.vector import feature_vector
 from edge.record.recording import load
 from edge.record.saving import save
 from edge.touch.arm import Chain
@@ -75,21 +72,6 @@ def test_recordings_without_shear_are_left_out_and_named(sheared, recordings, tm
     assert len(data.trials) == 16
     with pytest.raises(InputError, match="no recording has shear"):
         load_trials([recordings], Measurement(["skin_shear_size"]))
-
-
-def test_training_and_the_board_compute_the_same_bits(recordings, exported):
-    model = Model(exported / "model.onnx")
-    data = load_trials([recordings], Measurement(horizon_s=1.2))
-    for trial, expected in zip(data.trials[::3], data.features()[::3], strict=True):
-        recording = load(trial.path)
-        classifier = Classifier(model, recording.layout)
-        contacts = []
-        for frame in recording:
-            classifier.push(frame)
-            pending = [waiting.contact for waiting in classifier._pending]
-            contacts += [contact for contact in pending if contact not in contacts]
-        vector = feature_vector(contacts[0].series(), 1.2)
-        assert vector.tobytes() == expected.tobytes()
 
 
 def test_the_digest_follows_the_data(folder, tmp_path):

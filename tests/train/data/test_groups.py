@@ -8,7 +8,6 @@ import pytest
 
 import train
 from edge.record.saving import save
-from train.data.folds import representative
 from train.data.groups import fold_count, groupable, kinds_of
 
 
@@ -69,16 +68,3 @@ def test_entire_kinds_are_left_out_where_every_class_has_three(
         for grid in candidate.grids
     } == {10}
     assert fitted.chosen["object"].held_out == "trial"
-
-
-def test_a_representative_part_has_every_set_of_labels_and_their_shares():
-    labels = np.repeat(["cup", "can", "box"], [600, 399, 1])
-    y = {"object": labels, "side": np.array(["left", "right"] * 500)}
-    part = representative(y, 100)
-    assert part.tolist() == sorted(set(part.tolist()))
-    assert part.tolist() == representative(y, 100).tolist()
-    counts = {name: int((labels[part] == name).sum()) for name in set(labels)}
-    assert counts["box"] == 1
-    assert counts["cup"] == pytest.approx(60, abs=2)
-    assert counts["can"] == pytest.approx(40, abs=2)
-    assert representative(y, 1000).tolist() == list(range(1000))

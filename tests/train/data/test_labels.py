@@ -15,13 +15,6 @@ SIMULATED = {
 }
 
 
-def test_softness_and_mobility_follow_from_the_category_and_the_reverse():
-    halves = {"softness": "soft", "mobility": "fixed"}
-    both = {"category": "soft-fixed", **halves}
-    labels = completed([SIMULATED, {"category": "soft-fixed"}, halves])
-    assert labels == [SIMULATED, both, both]
-
-
 def test_labels_of_other_tasks_follow_where_all_trials_that_have_them_agree():
     complete = {"grasp": "left-full", "side": "left", "filling": "full"}
     assert completed([complete, {"grasp": "right-empty"}])[1] == {

@@ -40,10 +40,10 @@ def test_what_is_put_is_the_same_once_memory_was_released(scratch):
     zones = {"skin": rng.integers(0, 9, (40, 5))}
     records = [Record(rng.normal(size=n), zones) for n in (0, 7, 30, 500)]
     stored = [scratch.put_fields(record) for record in records]
-    for record, other in zip(records, scratch.each(stored), strict=True):
-        assert other.t.tobytes() == record.t.tobytes()
-        assert other.zones["skin"].tolist() == zones["skin"].tolist()
-        assert other.t.flags.writeable
+    for record, copy in zip(records, scratch.each(stored), strict=True):
+        assert copy.t.tobytes() == record.t.tobytes()
+        assert copy.zones["skin"].tolist() == zones["skin"].tolist()
+        assert copy.t.flags.writeable
     assert pickle.loads(pickle.dumps(scratch)).tables == {}
 
 

@@ -2,7 +2,7 @@
 
 import pytest
 
-from tests.train.importers.test_csv import RATE, imported, put
+from tests.train.importers.test_csv import imported, put
 from train.__main__ import main
 
 TRIAL = "t,p1\n0,1\n0.1,2\n"
@@ -76,13 +76,6 @@ def test_a_column_of_texts_that_several_trials_share_is_a_task(folder, capsys):
     assert "ignored" not in capsys.readouterr().out
 
 
-def test_a_label_that_changes_within_a_file_is_a_question(folder, refused):
-    put(folder, {"walk_1.csv": rows_of("mud", "ice")})
-    message = refused("csv", folder)
-    assert "column label" in message
-    assert "--label folder" in message
-
-
 @pytest.mark.parametrize("word", ["9", "colour"])
 def test_a_label_that_is_not_there_is_refused(folder, refused, word):
     put(folder, {"cup_1.csv": TRIAL})
@@ -113,11 +106,3 @@ def test_a_row_of_a_file_that_is_not_imported_is_no_slip(folder, capsys):
     assert "names no file" not in error
     out = str(folder.parent / "one")
     assert main(["import", "csv", str(folder / "r0.csv"), "--out", out]) == 0
-
-
-def test_labels_stand_as_they_are_in_any_spreadsheets_form(folder):
-    table = "\ufefftrial;object;softness\r\n1;012;\r\n2;None;1\r\n"
-    put(folder, {"1.txt": "1 2\n1 3\n", "2.txt": "1 2\n1 3\n", "labels.csv": table})
-    _, recordings = imported(folder, *RATE)
-    assert recordings["1"].labels == {"object": "012"}
-    assert recordings["2"].labels == {"object": "None", "softness": "1"}

@@ -32,16 +32,16 @@ def test_the_probability_is_that_of_a_share_of_unmet_things():
     logs = np.linspace(-0.5, 1.0, 7)
     ratio = (np.log(1.5) * logs - 0.5 * np.log(1.5) ** 2) / 0.2**2
     odds = (1.0 - SHARE) / SHARE * np.exp(-ratio)
-    known = [remoteness.known(0, score) for score in np.exp(logs)]
-    assert known == pytest.approx(odds / (1.0 + odds), abs=0.06)
+    probabilities = [remoteness.known(0, score) for score in np.exp(logs)]
+    assert probabilities == pytest.approx(odds / (1.0 + odds), abs=0.06)
 
 
 def test_training_knows_things_as_the_board_does():
     remoteness = remoteness_of(remote(1.0), remote(1.5, seed=1))
     new = remote(1.2, n=9, seed=2)
-    for point, known in enumerate(known_of(remoteness, new)):
+    for point, probabilities in enumerate(known_of(remoteness, new)):
         expected = [remoteness.known(point, score) for score in new[point]]
-        assert known == pytest.approx(expected)
+        assert probabilities == pytest.approx(expected)
 
 
 def test_where_nothing_can_be_left_out_the_usual_curve_serves():
@@ -52,10 +52,10 @@ def test_where_nothing_can_be_left_out_the_usual_curve_serves():
 
 
 def test_what_is_unknown_has_no_name_to_be_sure_of():
-    known = np.arange(50) == 0
+    probabilities = np.arange(50) == 0
     unknown = np.array([True, True, False, False, False])
     confidence = np.array([0.95, 0.3, 0.95, 0.3, 0.7])
-    assert worth_of(known, unknown, confidence) == {
+    assert worth_of(probabilities, unknown, confidence) == {
         "known": 0.02,
         "unknown": 0.4,
         "unsure": 0.2,

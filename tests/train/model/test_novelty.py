@@ -5,7 +5,6 @@ import math
 import numpy as np
 import pytest
 
-from tests.checks.hard_cases import exact
 from train.data.folds import stratified_folds
 from train.data.vectors import Vectors
 from train.model import novelty
@@ -32,17 +31,6 @@ def trials(n, seed=0, points=2):
     hidden = rng.normal(size=(points, n, 6)) + 5.0 * (np.arange(n) % 4)[:, None]
     X = hidden @ mixing + 0.1 * rng.normal(size=(points, n, 30))
     return X * np.repeat([1.0, 1e-4], WIDTHS), labels
-
-
-def test_the_score_is_that_of_integers():
-    X, labels = trials(60)
-    space = NoveltySpace.of(X, labels, WIDTHS)
-    new, _ = trials(20, seed=5)
-    new[0, 10:] *= 3.0
-    new[:, 0] = [point.mean for point in space.points]  # nothing lies outside
-    for name, values in exact.doubt(space, 0, new[0]).items():
-        assert min(values) > 0.0
-        assert getattr(space.scores(new), name)[0].tolist() == values.tolist()
 
 
 def test_no_whole_number_reaches_2_to_the_53():

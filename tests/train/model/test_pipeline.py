@@ -10,14 +10,7 @@ from train.model.pipeline import (
     ContactClassifier,
     nearest_of_label,
     slope,
-    vote,
 )
-
-
-def test_votes_and_ties():
-    labels = np.array([[2, 0, 0], [1, 0, 2], [1, 0, 0], [2, 2, 0]])
-    assert vote(labels).tolist() == [0, 1, 0, 2]
-    assert vote(np.array([[2, 0]])).tolist() == [2]
 
 
 def test_a_twentieth_of_a_labels_trials_stand_for_it_but_three_if_there_are():

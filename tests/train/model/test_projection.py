@@ -136,9 +136,9 @@ def test_discriminants_are_those_of_fifty_digits(rows, labels, shrinkage):
     weights = Spectrum(X).discriminants(indices, shrinkage)
     assert weights.shape[1] <= min(len(set(labels)) - 1, X.shape[1])
     z = X @ weights - (X @ weights).mean(axis=0)
-    ours = ((z[:, None] - z) ** 2).sum(axis=2)
+    computed = ((z[:, None] - z) ** 2).sum(axis=2)
     exact = exact_distances(rows, labels, shrinkage)
-    assert np.abs(ours - exact).max() < 1e-9 * exact.max()
+    assert np.abs(computed - exact).max() < 1e-9 * exact.max()
 
 
 def test_discriminants_have_a_fixed_sign():
@@ -196,9 +196,9 @@ def test_leading_axes_are_those_of_the_full_decomposition(shape, decades):
     more."""
     side = min(shape)
     X = rows_of(shape, 10.0 ** -np.linspace(0, decades, side), np.random.default_rng(5))
-    ours = Spectrum(X).leading(side - 2)
+    computed = Spectrum(X).leading(side - 2)
     _, exact, _ = principal_axes(X)
-    assert len(ours) == min(side - 2, len(exact))
-    signs = np.sign((ours @ exact.T).diagonal())[:, None]
-    assert np.abs(ours - signs * exact[: len(ours)]).max() < 1e-7
-    assert np.abs(ours @ ours.T - np.eye(len(ours))).max() < 1e-7
+    assert len(computed) == min(side - 2, len(exact))
+    signs = np.sign((computed @ exact.T).diagonal())[:, None]
+    assert np.abs(computed - signs * exact[: len(computed)]).max() < 1e-7
+    assert np.abs(computed @ computed.T - np.eye(len(computed))).max() < 1e-7

@@ -146,20 +146,22 @@ class TestProduct:
     LIMIT = upper_limit(0, 2, TEST_SHARE * RISK)
     WAITING = StoppingRule(LIMIT, 1.2, NEVER, 2)
 
-    def test_a_factor_follows_its_rules_at_its_own_pace_and_waits_before_them(self):
-        window = StoppingRule(0.8, 1.2, NEVER, 2)
-        sure = StoppingRule(0.9, 1.0, 0.7, 2)
-        product, factor = self.agreeing(window, sure)
-        assert product == [window, sure]
-        assert factor == [self.WAITING, window, replace(sure, mean_s=0.4)]
-
-    def test_a_factor_is_never_slower_at_a_looser_error(self):
-        """The product has the rules that both follow."""
-        fast = StoppingRule(0.8, 1.0, 0.7, 2)
-        slow = StoppingRule(0.9, 1.2, 0.95, 2)
-        product, factor = self.agreeing(fast, slow)
-        assert product == [fast]
-        assert factor == [self.WAITING, replace(fast, mean_s=0.4)]
+    @pytest.mark.parametrize(
+        ("rules", "follows"),
+        [
+            (((0.8, 1.2, NEVER, 2), (0.9, 1.0, 0.7, 2)), 2),
+            # A factor is never slower at a looser error: both follow the first.
+            (((0.8, 1.0, 0.7, 2), (0.9, 1.2, 0.95, 2)), 1),
+        ],
+    )
+    def test_a_factor_follows_its_rules_at_its_own_pace_and_waits_before_them(
+        self, rules, follows
+    ):
+        rules = [StoppingRule(*rule) for rule in rules]
+        product, factor = self.agreeing(*rules)
+        assert product == rules[:follows]
+        *before, last = product
+        assert factor == [self.WAITING, *before, replace(last, mean_s=0.4)]
 
 
 def test_a_family_has_half_the_level_and_goes_on_from_its_last_limit():

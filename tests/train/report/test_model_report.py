@@ -17,7 +17,7 @@ from train.report import model_report as report
 
 
 @pytest.fixture(scope="module")
-def written(recordings, tmp_path_factory):
+def model_and_page(recordings, tmp_path_factory):
     """A report of 16 trials, of which hard_3 is labelled wrong and hard_7 touches
     nothing."""
     folder = tmp_path_factory.mktemp("labelled")
@@ -50,8 +50,8 @@ def table(page, name):
     return rows_of(page.parent / f"{name}.csv")
 
 
-def test_trials_are_counted_by_label_robot_and_day(written):
-    rows = table(written[1], "recordings")
+def test_trials_are_counted_by_label_robot_and_day(model_and_page):
+    rows = table(model_and_page[1], "recordings")
     assert [tuple(row.values()) for row in rows] == [
         ("category", "rigid-fixed", "6"),
         ("category", "soft-fixed", "9"),
@@ -61,8 +61,8 @@ def test_trials_are_counted_by_label_robot_and_day(written):
     ]
 
 
-def test_the_answers_are_those_that_the_nested_accuracy_counts(written):
-    fitted, page = written
+def test_the_answers_are_those_that_the_nested_accuracy_counts(model_and_page):
+    fitted, page = model_and_page
     result = fitted.chosen["category"].accuracy
     answers = report.answers_of(fitted)["category"]
     assert ((answers.answers == answers.truth) == result.hits).all()
@@ -78,8 +78,8 @@ def test_the_answers_are_those_that_the_nested_accuracy_counts(written):
     assert "The trials include 1 recording without a contact." in page.read_text()
 
 
-def test_a_wrong_answer_is_named_with_its_nearest_trial(written):
-    fitted, page = written
+def test_a_wrong_answer_is_named_with_its_nearest_trial(model_and_page):
+    fitted, page = model_and_page
     rows = {row["trial"]: row for row in table(page, "wrong")}
     assert len(rows) == (~fitted.chosen["category"].accuracy.hits).sum()
     row = rows["hard_3"]
@@ -90,8 +90,8 @@ def test_a_wrong_answer_is_named_with_its_nearest_trial(written):
     assert float(row["distance"]) > 0.0
 
 
-def test_features_and_prices_have_their_tables(written):
-    _, page = written
+def test_features_and_prices_have_their_tables(model_and_page):
+    _, page = model_and_page
     values = {row["feature"]: row["values"] for row in table(page, "features")}
     assert values == dict.fromkeys(FEATURES, "40")
     assert [row["features"] for row in table(page, "candidates")] == ["paper"]

@@ -8,9 +8,9 @@ from matplotlib.figure import Figure as MatplotlibFigure
 
 from tests import browser
 from train.report.page import file_name, page, table_csv, write
-from train.report.section import Figure, Section, Table
+from train.report.section import Figure, ReportTable, Section
 
-WIDE = Table(
+WIDE = ReportTable(
     "wide",
     "Many columns and rows",
     [{f"a longer heading {i}": f"cell {i} with several words" for i in range(20)}] * 40,
@@ -24,7 +24,7 @@ def table(**more):
         {"case": "a,b", "n": 1, "seconds": 0.5},
         {"case": HOSTILE, "n": 2, "seconds": 0.25},
     ]
-    return Table("speed", "How fast", rows, **more)
+    return ReportTable("speed", "How fast", rows, **more)
 
 
 def test_text_from_elsewhere_is_escaped():
@@ -50,7 +50,7 @@ def test_timings_are_in_a_file_of_their_own():
 
 
 def test_the_page_holds_its_pictures_and_no_table_without_rows(tmp_path):
-    tables = [table(), Table("empty", "Nothing", [])]
+    tables = [table(), ReportTable("empty", "Nothing", [])]
     figures = [Figure("plot", "A plot", b"\x89PNG")]
     section = Section("One", figures=figures, tables=tables)
     text = write(tmp_path, "Title", [], [section]).read_text()

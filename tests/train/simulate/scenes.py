@@ -45,28 +45,28 @@ def specs_of(scene, step_s=0.01):
 
 
 @dataclass(frozen=True)
-class Seen(PhysicsRun):
+class RunWithReadings(PhysicsRun):
     """A run with its readings, and their counts (n, frames, rows, cols)."""
 
     counts: np.ndarray
     all_readings: list[Readings]
 
 
-def run_batch(scene, specs, **options) -> Seen:
+def run_batch(scene, specs, **options) -> RunWithReadings:
     physics = run_physics(scene, specs, **options)
     all_readings = list(readings(physics))
-    return Seen(
+    return RunWithReadings(
         **vars(physics),
         counts=np.stack([read.frames() for read in all_readings]),
         all_readings=all_readings,
     )
 
 
-def run(scene, step_s=0.01, **options) -> Seen:
+def run(scene, step_s=0.01, **options) -> RunWithReadings:
     return run_batch(scene, specs_of(scene, step_s), **options)
 
 
-def press(*add, **keys) -> Seen:
+def press(*add, **keys) -> RunWithReadings:
     """A run of one fixed object with these keys."""
     return run(make(one_object(**keys), *add))
 

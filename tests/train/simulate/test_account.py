@@ -1,10 +1,8 @@
 """The error that `--explain` gives a scene's steps."""
 
-from dataclasses import replace
-
 from tests.conftest import ROOT
 from tests.train.simulate.scenes import make, movable, specs_of
-from train.simulate.account import explain, step_error
+from train.simulate.account import step_error
 from train.simulate.plan import kinds
 from train.simulate.scene import load
 
@@ -21,11 +19,3 @@ def test_halving_the_step_halves_the_error():
     scene = make(movable(1.0, 0.4, 0.35, width_m=0.05))
     errors = [step_error(scene, specs_of(scene, h)) for h in (0.005, 0.0025)]
     assert 0.0 < errors[1] < 0.7 * errors[0]
-
-
-def test_each_effect_stands_with_what_called_for_it():
-    scene = replace(make(movable(1.0, 0.4, 0.35)), add=("noise",))
-    _, step, *effects = explain(scene).splitlines()
-    assert step.startswith("  step 10 ms errs by ")
-    rows = [line.split() for line in effects]
-    assert rows[1:] == [["sliding", "movable"], ["noise", "effects.add"]]

@@ -173,11 +173,13 @@ class TestBoard:
         with pytest.raises(InputError, match="cannot be read"):
             board.read(tmp_path / "none.json")
         path = board_file(tmp_path / "board.json", "0" * 64)
-        whole = path.read_text()
+        content_of_file = path.read_text()
         assert board.read(path).memory_mb == 61.5
-        wrong = ["[" * 100_000, whole[:50]]
-        wrong += [whole.replace(name, "x") for name in ("decision", "cold_start_ms")]
-        for text in (*wrong, whole.replace("100.0", "NaN")):
+        wrong = ["[" * 100_000, content_of_file[:50]]
+        wrong += [
+            content_of_file.replace(name, "x") for name in ("decision", "cold_start_ms")
+        ]
+        for text in (*wrong, content_of_file.replace("100.0", "NaN")):
             path.write_text(text)
             with pytest.raises(InputError, match="not a board file: .*; make one with"):
                 board.read(path)
@@ -204,7 +206,7 @@ def test_a_board_file_of_another_model_is_one_sentence(recordings, tmp_path, ref
 
 
 @pytest.fixture(scope="module")
-def written(tmp_path_factory):
+def small_report(tmp_path_factory):
     """The report on 28 touches, its text, and the digest of its recordings, with few
     windows and changes."""
     folder = tmp_path_factory.mktemp("tradeoff")
@@ -226,21 +228,27 @@ def written(tmp_path_factory):
 
 
 @pytest.mark.slow
-def test_the_report_tells_of_the_board_and_needs_no_other_page(written):
+def test_the_report_tells_of_the_board_and_needs_no_other_page(small_report):
     ready = "62 MB of memory, and the model is ready 812 ms after the start of Python"
-    assert ready in written.text
-    assert written.report.with_name("tradeoff.png").read_bytes().startswith(b"\x89PNG")
-    assert "http" not in written.text
-    assert not browser.available() or browser.faults(written.report) == []
+    assert ready in small_report.text
+    assert (
+        small_report.report.with_name("tradeoff.png")
+        .read_bytes()
+        .startswith(b"\x89PNG")
+    )
+    assert "http" not in small_report.text
+    assert not browser.available() or browser.faults(small_report.report) == []
 
 
 @pytest.mark.slow
-def test_each_change_and_the_front_of_quick_choices_lie_beside_the_report(written):
-    rows = rows_of(written.report.with_name("costs.csv"))
+def test_each_change_and_the_front_of_quick_choices_lie_beside_the_report(small_report):
+    rows = rows_of(small_report.report.with_name("costs.csv"))
     changes = {row["change"]: row for row in rows}
     assert changes["waiting 0.4 s"]["category, points"].startswith("+0 (-")
     assert changes["the paper's features"]["saves"] == "only 3 features"
-    front = ParetoFront.read(written.report.with_name("front.json"), written.digest)
+    front = ParetoFront.read(
+        small_report.report.with_name("front.json"), small_report.digest
+    )
     assert front.task == "category"
     assert front.quick
     assert front.points[-1].accuracy > 0.9

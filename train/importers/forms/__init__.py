@@ -39,8 +39,20 @@ FORMS = [
     serial,
     text,
 ]
-TEXTS = ".csv .tsv .txt .dat .log .asc .asf .json .jsonl .ndjson"
-SUFFIXES = (*TEXTS.split(), ".parquet", *arrays.SUFFIXES)
+SUFFIXES = (
+    ".csv",
+    ".tsv",
+    ".txt",
+    ".dat",
+    ".log",
+    ".asc",
+    ".asf",
+    ".json",
+    ".jsonl",
+    ".ndjson",
+    ".parquet",
+    *arrays.SUFFIXES,
+)
 """Files that are looked at in a folder."""
 
 

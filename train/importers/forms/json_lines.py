@@ -1,7 +1,9 @@
-"""JSON: an object for each frame, a line each or in one list; lists in them are
-arrays."""
+"""JSON: an object for each frame, a line each or in one list, or one object with a list
+for each column; lists in a frame are arrays."""
 
 from collections.abc import Iterator
+from contextlib import suppress
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -21,12 +23,7 @@ def is_form(file: File) -> bool:
 def tables(file: File, options: TableOptions) -> Iterator[Table]:
     """The frames; numbers of an object within are `OUTER.INNER`."""
     with parsing(str(file.path), "frames in JSON", "; write an object a line"):
-        if file.head.startswith("["):
-            objects = dict(enumerate(decode_json("\n".join(file.lines)), 1))
-        else:
-            lines = enumerate(file.lines, 1)
-            objects = {i: decode_json(line) for i, line in lines if line.strip()}
-        frames = pd.json_normalize([*objects.values()])
+        frames = _frames(file.lines)
         shape: tuple[int, ...] = ()
         parts = []
         for name, cells in frames.items():
@@ -40,4 +37,22 @@ def tables(file: File, options: TableOptions) -> Iterator[Table]:
             names = numbered(str(name), flat.shape[1])
             parts.append(pd.DataFrame(flat, lists.index, names))
         data = pd.concat(parts, axis=1)
-    yield Table(str(file.path), data.set_axis([*objects]), shape=shape)
+    yield Table(str(file.path), data, shape=shape)
+
+
+def _frames(lines: list[str]) -> pd.DataFrame:
+    """A row for each frame; the index is its line, or its number from 1."""
+    value: Any = None
+    with suppress(ValueError):  # several objects, a line each
+        value = decode_json("\n".join(lines))
+    if isinstance(value, dict):
+        # A list whose entries have several lengths is no array.
+        columns = {name: np.array(cells).tolist() for name, cells in value.items()}
+        frames = pd.DataFrame(columns)
+        return frames.set_axis(range(1, len(frames) + 1))
+    objects = value or {
+        i: decode_json(line) for i, line in enumerate(lines, 1) if line.strip()
+    }
+    if isinstance(objects, list):
+        objects = dict(enumerate(objects, 1))
+    return pd.json_normalize([*objects.values()]).set_axis([*objects])

@@ -30,7 +30,21 @@ UNNAMED = re.compile(r"Unnamed: \d+")
 """What pandas calls a column without a name."""
 UNIT = re.compile(r"[\[(]?(s|sec|seconds|ms|us|µs|ns)[\])]?", re.I)
 """A cell of a row of units, below the time."""
-NO_NUMBER = ["", *"nan NaN NAN NA N/A n/a null NULL None - -- #N/A".split()]
+NO_NUMBER = [
+    "",
+    "nan",
+    "NaN",
+    "NAN",
+    "NA",
+    "N/A",
+    "n/a",
+    "null",
+    "NULL",
+    "None",
+    "-",
+    "--",
+    "#N/A",
+]
 """Cells of a column of numbers that are empty."""
 SAMPLE = 200
 """Rows that tell the columns of numbers."""

@@ -15,18 +15,18 @@ MOVIE = (
     "a movie, which is not read: export it as text (in Tekscan's programs: Save ASCII)"
 )
 UNREAD = {
-    PICTURE: ".png .jpg .jpeg .bmp .gif .tif .tiff .webp",
-    SHEET: ".xlsx .xls .xlsm .ods",
-    LOG: ".bag .mcap .db3",
-    OBJECTS: ".pkl .pickle .pt .pth .joblib",
-    MOVIE: ".asf .fsx .mov .mp4 .avi .mkv",
-    "CBOR, which is not read: export the samples as JSON or CSV": ".cbor",
-    "sound, which is not read: save the values as a table": ".wav .flac .mp3",
-    "TFRecord, which is not read: save the arrays as .npz": ".tfrecord",
-    "a grasp of an SDH-2 hand: give `python -m train import sdh2 FOLDER`": ".dsa",
+    PICTURE: (".png", ".jpg", ".jpeg", ".bmp", ".gif", ".tif", ".tiff", ".webp"),
+    SHEET: (".xlsx", ".xls", ".xlsm", ".ods"),
+    LOG: (".bag", ".mcap", ".db3"),
+    OBJECTS: (".pkl", ".pickle", ".pt", ".pth", ".joblib"),
+    MOVIE: (".asf", ".fsx", ".mov", ".mp4", ".avi", ".mkv"),
+    "CBOR, which is not read: export the samples as JSON or CSV": (".cbor",),
+    "sound, which is not read: save the values as a table": (".wav", ".flac", ".mp3"),
+    "TFRecord, which is not read: save the arrays as .npz": (".tfrecord",),
+    "a grasp of an SDH-2 hand: give `python -m train import sdh2 FOLDER`": (".dsa",),
 }
 """{what a file is: its suffixes}."""
-KINDS = {suffix: kind for kind, words in UNREAD.items() for suffix in words.split()}
+KINDS = {suffix: kind for kind, suffixes in UNREAD.items() for suffix in suffixes}
 
 
 def is_form(file: File) -> bool:

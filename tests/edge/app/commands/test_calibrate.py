@@ -3,7 +3,6 @@ rest."""
 
 from pathlib import Path
 
-import numpy as np
 import pytest
 
 from edge.app.commands import calibrate
@@ -12,24 +11,10 @@ from edge.wire.fake import player
 from edge.wire.fake.player import NOISE_COUNTS
 from edge.wire.skin import file as skinfile
 from edge.wire.skin.calibration import (
-    NOISY,
-    NOISY_COUNTS,
-    Sums,
     measure,
-    noisiest_taxels,
-    standing_out,
-    unusable,
 )
 from edge.wire.skin.decoder import dead_band
 from tests.edge.test_writing import left_by_a_dead_run
-
-
-def test_a_taxel_is_noisy_beyond_the_limit_and_not_at_it():
-    noise = np.full((3, 4), 2.0)
-    noise[0, 1] = NOISY * 2.0 + NOISY_COUNTS
-    assert noisiest_taxels(noise) == []
-    noise[2, 3], noise[1, 0] = noise[0, 1] + 1.0, noise[0, 1] + 9.0
-    assert noisiest_taxels(noise) == [(1, 0), (2, 3)]
 
 
 @pytest.fixture
@@ -111,28 +96,31 @@ def test_taxels_that_are_not_read_or_saturated_keep_their_former_values_by_force
     assert skinfile.load(skin).calibration.baseline[0, 2] == 20946
 
 
-def test_only_the_values_of_a_block_may_rest_at_0():
-    shares = np.ones((8, 12))
-    pad = skinfile.load(skinfile.shipped("mpr121"))
-    assert unusable(pad, np.zeros((8, 12), np.uint16), shares).all()
-    assert unusable(pad, np.full((8, 12), 1023, np.uint16), shares).all()
-    matrix = skinfile.load(skinfile.shipped("matrix"))
-    shape = matrix.layout.shape
-    assert not unusable(matrix, np.zeros(shape, np.uint16), np.ones(shape)).any()
+@pytest.mark.parametrize(
+    ("line", "dead"),
+    [("[skin]", "[0, 1, 2, 24, 25]"), ("[signal]", "[[0, 0], [0, 1], [0, 2], [1, 0]]")],
+)
+def test_dead_taxels_are_neither_read_nor_in_the_way(edge, skin, quiet, line, dead):
+    """Also after a calibration in which they worked, and rested elsewhere."""
+    words = ("calibrate", "--skin", skin, "--fake", quiet, "--frames", 20, "--yes")
+    assert edge(*words)[0] == 0
+    text = skin.read_text().replace("dead = []", "")
+    skin.write_text(text.replace(f"{line}\n", f"{line}\ndead = {dead}\n"))
+    for _ in range(2):
+        assert edge(*words)[1][0]["moving"] == []
+        assert skinfile.load(skin).calibration.baseline[0, :4].tolist() == [
+            0,
+            0,
+            0,
+            20946,
+        ]
 
 
-def test_mean_and_deviation_are_exact_at_a_large_offset():
-    draw = np.random.default_rng(0)
-    values = (60000 + draw.integers(-2, 3, (5000, 4, 6))).astype(np.int64)
-    values[:, 0, 0] = 65535
-    sums = Sums((4, 6))
-    for frame in values:
-        sums.add(frame.astype(np.uint16), np.ones((4, 6), bool))
-    mean, deviation = sums.mean_and_deviation()
-    np.testing.assert_array_equal(mean, np.rint(values.mean(axis=0)))
-    exact = (values - 60000).astype(np.float64).std(axis=0, ddof=1)
-    exact[0, 0] = 0.0
-    np.testing.assert_allclose(deviation, exact, rtol=1e-12, atol=1e-12)
+def test_a_skin_on_which_all_is_dead_is_refused(edge, skin):
+    text = skin.read_text().replace("dead = []", "")
+    every = list(range(384))
+    skin.write_text(text.replace("[skin]\n", f"[skin]\ndead = {every}\n"))
+    assert edge("check", skin)[0] == 2
 
 
 SIX = [(5, 5), (5, 6), (5, 7), (6, 5), (6, 6), (6, 7)]
@@ -208,22 +196,6 @@ def test_a_single_taxel_or_a_small_drift_is_calibrated(
     assert status == 0
     is_named = "1 taxel far off the former calibration at rest: [5, 5]; if" in err
     assert is_named == (len(taxels) == 1)
-
-
-def test_taxels_side_by_side_stand_out_of_a_skin_that_rests_at_0():
-    file = skinfile.load(skinfile.shipped("matrix"))
-    zero = np.zeros(file.layout.shape, np.uint16)
-    zero[3:6, 3:6] = 300
-    assert np.count_nonzero(standing_out(file, zero)) == 9
-
-
-def test_electrodes_of_unequal_wires_stand_out_only_where_they_are_touched():
-    pad = skinfile.load(skinfile.shipped("electrodes"))
-    rest = np.array([600, 612, 575, 590, 640, 605, 566, 597, 621, 580, 615, 599])
-    assert not standing_out(pad, rest.reshape(4, 3).astype(np.uint16)).any()
-    rest[[4, 7]] -= 200  # a touch lowers the values of an MPR121
-    touched = standing_out(pad, rest.reshape(4, 3).astype(np.uint16))
-    assert np.argwhere(touched > pad.layout.onset).tolist() == [[1, 1], [2, 1]]
 
 
 def test_a_calibration_that_would_make_taxels_deaf_is_refused(

@@ -1,7 +1,6 @@
 """Labels of recordings, listed and changed."""
 
 from dataclasses import replace
-from pathlib import Path
 
 import pytest
 
@@ -42,22 +41,13 @@ def test_the_labels_of_a_folder_are_listed_and_its_files_left_alone(folder, a, e
 
 def test_a_file_is_relabelled_and_keeps_all_else(a, edge):
     before = load(a)
-    new = ("--set", "object=brick", "--set", "softness=rigid", "--yes")
-    _, lines, _ = edge("label", a, *new)
+    new = "--set object=brick --set softness=rigid --unset category --yes"
+    _, lines, _ = edge("label", a, *new.split())
     after = load(a)
     assert lines[0]["labels"] == after.labels
-    assert after.labels == {
-        "category": "rigid-fixed",
-        "object": "brick",
-        "softness": "rigid",
-    }
+    assert after.labels == {"object": "brick", "softness": "rigid"}
     assert (after.frames == before.frames).all()
     assert {**after.meta, "labels": before.labels} == before.meta
-
-
-def test_the_label_of_a_task_is_taken_away(a, edge):
-    edge("label", a, "--unset", "object", "--yes")
-    assert load(a).labels == {"category": "rigid-fixed"}
 
 
 def test_what_cannot_be_changed_leaves_every_file_as_it_was(a, refused):
@@ -83,7 +73,7 @@ def test_nothing_changes_before_it_is_shown_and_agreed_to(a, refused):
 
 
 @pytest.fixture
-def kept(make_touch, tmp_path):
+def touches(make_touch, tmp_path):
     """Kept touches: a sure one, an unsure one, a wrong one, and one that is unknown."""
     touch = make_touch()
     cases = {
@@ -98,37 +88,13 @@ def kept(make_touch, tmp_path):
     return tmp_path / "kept"
 
 
-@pytest.mark.parametrize(
-    ("words", "expected"),
-    [
-        (["unsure"], ["unknown", "unsure"]),
-        (["object", "unsure"], ["unknown"]),
-    ],
-)
-def test_touches_are_listed_by_what_asks_for_a_look(kept, edge, words, expected):
-    options = [f"--only={word}" for word in words]
-    _, lines, _ = edge("label", kept, *options)
-    assert [Path(line["file"]).stem for line in lines] == expected
+def test_a_decision_is_accepted_but_for_what_is_corrected(touches, edge):
+    edge("label", touches / "unsure.npz", "--accept", "--set", "softness=soft", "--yes")
+    assert load(touches / "unsure.npz").labels == {"softness": "soft"}
 
 
-def test_a_decision_is_accepted_where_it_names_a_label_and_nobody_has(kept, edge):
-    edge("label", kept, "--accept", "--yes")
-    after = {path.stem: load(path).labels for path in find([str(kept)])}
-    assert after == {
-        "sure": {"softness": "soft"},
-        "unsure": {"softness": "hard"},
-        "wrong": {"softness": "soft"},
-        "unknown": {"softness": "soft"},
-    }
-
-
-def test_a_decision_is_accepted_but_for_what_is_corrected(kept, edge):
-    edge("label", kept / "unsure.npz", "--accept", "--set", "softness=soft", "--yes")
-    assert load(kept / "unsure.npz").labels == {"softness": "soft"}
-
-
-def test_that_no_touch_is_of_a_kind_is_said(kept, edge):
-    status, _, err = edge("label", kept / "sure.npz", "--only", "wrong")
+def test_that_no_touch_is_of_a_kind_is_said(touches, edge):
+    status, _, err = edge("label", touches / "sure.npz", "--only", "wrong")
     assert status == 1
     assert "none of 1 recording is of this kind" in err
 
@@ -149,48 +115,43 @@ def test_all_that_have_a_label_get_another_and_slips_are_told_with_their_files(
     assert {load(path).labels["object"] for path in find([str(tmp_path)])} == {"cup"}
 
 
-def test_a_word_of_only_that_is_no_state_or_task_is_refused(kept, refused):
-    err = refused("label", kept, "--only", "softnes=soft")
-    assert "unsure, wrong, unlabelled, left_out, object, softness, or TASK=LABEL" in err
-
-
-def test_what_is_left_out_is_listed_so_and_put_back(kept, edge):
-    edge("label", kept / "sure.npz", "--leave-out", "--yes")
-    assert len(find([str(kept)])) == 3
-    (line,) = edge("label", kept, "--only", "left_out")[1]
+def test_what_is_left_out_is_listed_so_and_put_back(touches, edge):
+    edge("label", touches / "sure.npz", "--leave-out", "--yes")
+    assert len(find([str(touches)])) == 3
+    (line,) = edge("label", touches, "--only", "left_out")[1]
     assert line["kinds"] == ["unlabelled", "left_out"]
-    edge("label", kept, "--put-back", "--yes")
-    assert len(find([str(kept)])) == 4
+    edge("label", touches, "--put-back", "--yes")
+    assert len(find([str(touches)])) == 4
 
 
-def test_each_recording_gets_its_row_for_a_spreadsheet(kept, edge):
-    edge("label", kept, "--rows", "--yes")
-    rows = (kept / TABLE).read_text("utf-8-sig").splitlines()
+def test_each_recording_gets_its_row_for_a_spreadsheet(touches, edge):
+    edge("label", touches, "--rows", "--yes")
+    rows = (touches / TABLE).read_text("utf-8-sig").splitlines()
     assert rows[0] == "file,softness,left_out"
     assert rows[-1] == "wrong.npz,soft,"
-    (kept / TABLE).write_text("file;softness\nwrong.npz;hard\n", "utf-8-sig")
-    assert edge("label", kept / "wrong.npz")[1][0]["labels"] == {"softness": "hard"}
+    (touches / TABLE).write_text("file;softness\nwrong.npz;hard\n", "utf-8-sig")
+    assert edge("label", touches / "wrong.npz")[1][0]["labels"] == {"softness": "hard"}
 
 
-def test_the_last_change_is_taken_back_in_all_of_its_folders(kept, edge, make_touch):
-    save(kept / "more" / "a.npz", make_touch())
-    edge("label", kept / "wrong.npz", "--set", "softness=firm", "--yes")
-    edge("label", kept, "--set", "softness=squashy", "--yes")
-    status, _, err = edge("label", kept, "--undo")
+def test_the_last_change_is_taken_back_in_all_of_its_folders(touches, edge, make_touch):
+    save(touches / "more" / "a.npz", make_touch())
+    edge("label", touches / "wrong.npz", "--set", "softness=firm", "--yes")
+    edge("label", touches, "--set", "softness=squashy", "--yes")
+    status, _, err = edge("label", touches, "--undo")
     assert status == 0
     assert err.count("is as before `edge-classify label") == 2
-    labels = {path.stem: load(path).labels for path in find([str(kept)])}
+    labels = {path.stem: load(path).labels for path in find([str(touches)])}
     assert labels["wrong"] == {"softness": "firm"}
     assert "softness" not in labels["a"]
-    assert edge("label", kept, "--undo")[0] == 2
+    assert edge("label", touches, "--undo")[0] == 2
 
 
-def test_a_row_whose_recording_is_gone_is_named(kept, edge):
-    (kept / TABLE).write_text("file,object\ngone.npz,cup\n")
-    err = edge("label", kept)[2]
+def test_a_row_whose_recording_is_gone_is_named(touches, edge):
+    (touches / TABLE).write_text("file,object\ngone.npz,cup\n")
+    err = edge("label", touches)[2]
     assert "labels.csv, line 2: there is no gone.npz here" in err
 
 
-def test_undo_takes_a_folder(kept, refused):
-    err = refused("label", kept / "mistyped", "--undo")
+def test_undo_takes_a_folder(touches, refused):
+    err = refused("label", touches / "mistyped", "--undo")
     assert "mistyped: --undo takes the folder of the recordings" in err

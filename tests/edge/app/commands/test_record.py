@@ -49,9 +49,9 @@ def frames(*poses):
 
 def test_recorders_side_by_side_save_every_trial_under_a_name_of_its_own(tmp_path):
     def record(_):
-        with recorder(tmp_path) as mine:
+        with recorder(tmp_path) as writer:
             for _ in range(20):
-                mine.save(frames(None), complete=True)
+                writer.save(frames(None), complete=True)
 
     with ThreadPoolExecutor(2) as threads:
         list(threads.map(record, range(2)))
@@ -61,8 +61,8 @@ def test_recorders_side_by_side_save_every_trial_under_a_name_of_its_own(tmp_pat
 def test_a_trial_keeps_its_joints_names_where_some_frames_have_no_pose(
     tmp_path, caplog
 ):
-    with recorder(tmp_path, names=("shoulder", "elbow")) as mine:
-        mine.save(frames(np.array([0.1, 0.2]), None), complete=True)
+    with recorder(tmp_path, names=("shoulder", "elbow")) as writer:
+        writer.save(frames(np.array([0.1, 0.2]), None), complete=True)
     trial = load(tmp_path / "box-001.npz")
     assert trial.joint_names == ("shoulder", "elbow")
     assert trial.joints[0].tolist() == [0.1, 0.2]
@@ -251,15 +251,15 @@ def test_a_trial_has_the_labels_that_held_when_its_touch_began(tmp_path):
     begun = SimpleNamespace(under_way=False)
     page = SimpleNamespace(recording=True, saved=lambda: None)
     page.labels = {"object": "box"}
-    with recorder(tmp_path, page=page) as mine:
-        mine.follow(begun)
+    with recorder(tmp_path, page=page) as writer:
+        writer.follow(begun)
         begun.under_way = True
         page.labels = {"object": "pillow"}
-        mine.follow(begun)
-        mine.save(frames(None), complete=True)
+        writer.follow(begun)
+        writer.save(frames(None), complete=True)
         begun.under_way = False
-        mine.follow(begun)
-        mine.save(frames(None), complete=True)
+        writer.follow(begun)
+        writer.save(frames(None), complete=True)
     names = sorted(path.name for path in tmp_path.glob("*.npz"))
     assert names == ["box-001.npz", "pillow-001.npz"]
 
@@ -267,11 +267,11 @@ def test_a_trial_has_the_labels_that_held_when_its_touch_began(tmp_path):
 def test_the_page_says_of_a_touch_that_its_onset_was_not_recorded(tmp_path):
     notices = []
     page = SimpleNamespace(labels={}, recording=False, notice=notices.append)
-    with recorder(tmp_path, page=page) as mine:
-        mine.follow(SimpleNamespace(under_way=False))
+    with recorder(tmp_path, page=page) as writer:
+        writer.follow(SimpleNamespace(under_way=False))
         page.recording = True
-        mine.follow(SimpleNamespace(under_way=True))
-        mine.save(frames(None), complete=True)
+        writer.follow(SimpleNamespace(under_way=True))
+        writer.save(frames(None), complete=True)
     assert list(tmp_path.iterdir()) == []
     (notice,) = notices
     assert "whose onset is missing: it is not saved" in notice

@@ -83,13 +83,13 @@ def little(monkeypatch):
 def test_the_oldest_go_first(edge, tmp_path, little):
     for i in range(3):
         save_touch(tmp_path / f"kept-20200101T00000{i}-00000.npz", frames=500)
-    mine = tmp_path / "mine.npz"
-    mine.write_bytes(bytes(2_000_000))
+    foreign = tmp_path / "mine.npz"
+    foreign.write_bytes(bytes(2_000_000))
     assert run(edge, tmp_path, "--keep-if", "all")[0] == 0
     names = sorted(path.name[5:20] for path in tmp_path.glob("kept-*.npz"))
     assert names[0] == "20200101T000001"
     assert len(names) == 3
-    assert mine.exists()
+    assert foreign.exists()
 
 
 def after_the_clock_went_back(folder, labels):
@@ -102,8 +102,8 @@ def after_the_clock_went_back(folder, labels):
 def test_the_order_of_arrival_counts_and_not_the_clock(edge, tmp_path, little):
     later = after_the_clock_went_back(tmp_path, {})
     assert "1 recording kept" in run(edge, tmp_path, "--keep-if", "all")[2]
-    (kept,) = tmp_path.glob("kept-*.npz")
-    assert kept.name.startswith("kept-n000042-")
+    (newest,) = tmp_path.glob("kept-*.npz")
+    assert newest.name.startswith("kept-n000042-")
     assert not later.exists()
 
 

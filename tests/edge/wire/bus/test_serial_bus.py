@@ -7,9 +7,11 @@ import sys
 import threading
 import tty
 from select import select
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
+import serial
 from hypothesis import example, given
 from hypothesis import strategies as st
 
@@ -20,13 +22,17 @@ from edge.wire.bus.protocol import (
     BusGone,
     BusMissing,
     BusTimeout,
+    read,
+    write,
 )
-from edge.wire.bus.serial_bus import SerialBus, decode, encode
+from edge.wire.bus.serial_bus import GAP_S, SerialBus, decode, encode
 from edge.wire.chips import block
 from edge.wire.chips.block import Block
 from edge.wire.chips.chip import ChipSpec
+from edge.wire.fake.clock import VirtualClock
 from edge.wire.skin.skin import Skin
 from tests.edge.wire.skin.small import one_chip
+from tests.serial_line import ANSWERS_AFTER_S, LineBus
 
 TAXELS = 6
 PATIENT_S = 3.0
@@ -223,6 +229,15 @@ def test_a_missing_port_and_a_missing_pyserial_are_one_sentence_each(
         SerialBus(board.port)
 
 
+def test_a_port_is_asked_for_low_latency_where_it_has_it(board, monkeypatch):
+    settings = []
+    monkeypatch.setattr(
+        serial.Serial, "set_low_latency_mode", lambda port, low: settings.append(low)
+    )
+    SerialBus(board.port, boot_s=0.0).close()
+    assert settings == [True]
+
+
 def test_a_port_that_another_program_has_open_is_refused_by_name(board, bus):
     with pytest.raises(
         BusError, match=f"{board.port}: another program has the port open"
@@ -249,3 +264,54 @@ def test_noise_costs_a_skin_no_frame(board, skin):
     noisy = board.asked + 1
     board.change = lambda answer, number: answer[: 5 if number == noisy else None]
     assert skin.read().valid.all()
+
+
+@pytest.fixture
+def line():
+    """A serial bus in virtual time, whose microcontroller serves zeros."""
+    bus = LineBus("line", clock=VirtualClock(), clock_hz=115_200, timeout_s=0.05)
+    zeros = SimpleNamespace(write=lambda data, t: None, read=lambda n, t: bytes(n))
+    bus.chips[0] = zeros
+    bus.plug(100)
+    return bus
+
+
+def failed_after_s(bus):
+    """Seconds until a request for an answer of 100 bytes was given up as noise."""
+    began = bus.now()
+    with pytest.raises(BusFault):
+        bus.transfer(bus.prepare(write(0, b"\x10"), read(0, 100)))
+    return bus.now() - began
+
+
+def test_an_answer_that_stops_is_given_up_after_the_gap_and_the_time_of_two_bytes(line):
+    line._port.cut_share = 1.0
+    line._port.random = SimpleNamespace(random=lambda: 0.0, randrange=lambda n: 50)
+    seconds = ANSWERS_AFTER_S + GAP_S + 2 * 10 / 115_200
+    assert failed_after_s(line) == pytest.approx(seconds)
+
+
+class Babbling:
+    """A port that always has 64 bytes more."""
+
+    in_waiting = 64
+
+    def __init__(self, hand, noise):
+        self.hand = hand
+        self.noise = noise
+
+    def write(self, packet):
+        self.ends = self.hand.now() + 1.0
+
+    def read(self, n):
+        self.hand.advance(1e-4)
+        assert self.hand.now() < self.ends
+        return self.noise * n
+
+    ends = float("inf")
+
+
+@pytest.mark.parametrize("noise", [b"\0", b"\1"])
+def test_a_line_that_never_falls_silent_costs_little_more_than_the_timeout(line, noise):
+    line._port = Babbling(line.hand, noise)
+    assert failed_after_s(line) < line.timeout_s + 0.05

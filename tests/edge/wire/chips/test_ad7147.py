@@ -17,10 +17,10 @@ SPEC = ChipSpec(AD7147, 0x2C, tuple(range(12)))
 @pytest.fixture(scope="module")
 def registers():
     """{register: the value that the start sequence writes}."""
-    written = {}
+    table = {}
     for first, values in ad7147.START_ROWS:
-        written.update(enumerate(values, first))
-    return written
+        table.update(enumerate(values, first))
+    return table
 
 
 def words(registers, first, count):

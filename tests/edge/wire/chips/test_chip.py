@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 
-from edge.wire.bus.protocol import BusNack
 from edge.wire.chips import ad7147, mpr121
 from edge.wire.chips.ad7147 import AD7147
 from edge.wire.chips.block import Block
@@ -35,13 +34,6 @@ def test_a_chip_serves_its_values_once_it_is_set_up_also_after_a_reset(pair):
         if not isinstance(chip, Block):  # a microcontroller comes up by itself
             assert not chip.healthy()
             assert not parsed(chip)[1].any()
-
-
-def test_a_constructor_checks_that_its_chip_is_there(pair):
-    bus, _, chip = pair
-    driver, _, _, options = next(c for c in CHIPS.values() if c[0] is type(chip))
-    with pytest.raises(BusNack):
-        driver(bus, 0x08, **options)
 
 
 @pytest.mark.parametrize(

@@ -240,10 +240,10 @@ def test_a_loose_wire_is_told_twice_a_second_at_most():
     chip = {"bus": SMALL.buses[1].device, "channel": 1, "address": 0x2D}
     loose = [Fault(**chip, during=(0.1 * k, 0.1 * k + 0.05)) for k in range(1, 31)]
     with faulty_skin(SMALL, lambda t: QUIET, faults=loose) as skin:
-        heard = [status.state for _, status in changes(skin, 3.6)]
-    assert heard[0] == "down"
-    assert heard[-1] == "running"
-    assert len(heard) <= 8
+        reports = [status.state for _, status in changes(skin, 3.6)]
+    assert reports[0] == "down"
+    assert reports[-1] == "running"
+    assert len(reports) <= 8
 
 
 @pytest.mark.parametrize("kind", SHARES)
@@ -294,16 +294,16 @@ def test_a_lost_bus_is_opened_again_and_again_and_both_changes_are_heard():
     name = SMALL.buses[1].device
     gone = Fault(code=errno.EIO, bus=name, during=(0.1, 4.0))
     opened = []
-    heard = []
+    reports = []
     with faulty_skin(SMALL, lambda t: QUIET, faults=[gone]) as skin:
         bus = skin.readers[1].bus
         reopen = bus.reopen
         bus.reopen = lambda: (opened.append(bus.now()), reopen())
         for frame in Loop(skin, lasts_s=5.0).frames():
-            heard += [(round(frame.t, 3), *change) for change in skin.bus_changes()]
+            reports += [(round(frame.t, 3), *change) for change in skin.bus_changes()]
     rests = np.diff([t for t in opened if t > 0.5])
     assert rests == pytest.approx(LONGEST_REST_S, abs=0.011)
-    (lost_at, *lost), (back_at, *back) = heard
+    (lost_at, *lost), (back_at, *back) = reports
     assert 0.1 <= lost_at < 0.2
     assert lost == [name, True]
     assert back == [name, False]

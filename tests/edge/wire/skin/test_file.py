@@ -15,7 +15,7 @@ from edge.wire.skin.calibration import (
 )
 from edge.wire.skin.decoder import dead_band
 from edge.wire.skin.file import TaxelCalibration
-from tests.edge.wire.skin.small import SMALL, mistake
+from tests.edge.wire.skin.small import SMALL, mistake, mpr121
 
 
 def test_cody_is_384_taxels_on_three_buses():
@@ -94,6 +94,14 @@ def test_a_calibration_is_written_replaced_and_read_back(tail):
         assert "# a comment that stays" in twice
         assert file.buses == skinfile.parse(SMALL).buses
         assert file.reading == skinfile.parse(SMALL + tail).reading
+
+
+def test_a_calibration_of_other_chips_is_refused_beyond_what_a_chip_tells():
+    most = np.full((3, 4), 1022, np.uint16)
+    text = mpr121() + calibration_text(TaxelCalibration(most, np.ones((3, 4))))
+    assert skinfile.parse(text).calibration.baseline.max() == 1022
+    sentence = mistake(text.replace("1022", "1023", 1))
+    assert "calibration.baseline is 1023 for a taxel of a mpr121" in sentence
 
 
 def test_a_calibration_that_cannot_be_replaced_is_refused():

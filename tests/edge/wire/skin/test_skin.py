@@ -1,6 +1,7 @@
 """The skin over the fake: frames put together from buses, chips and stages."""
 
 import threading
+import time
 from dataclasses import replace
 
 import numpy as np
@@ -16,7 +17,7 @@ from edge.wire.skin import file as skinfile
 from edge.wire.skin.decoder import HELD_S
 from edge.wire.skin.file import Reading
 from edge.wire.skin.loop import Loop
-from edge.wire.skin.skin import SILENT_FRAMES, Skin
+from edge.wire.skin.skin import SILENT_FRAMES, Skin, SystemClock
 from edge.wire.skin.wiring import BusSpec
 from tests.checks.faults import SKINS
 from tests.edge.wire.skin.small import CHIP, CODY, PICTURE
@@ -38,18 +39,6 @@ def on_one_bus():
 
 def test_all_checks_together_cost_at_most_4_percent_of_the_wire():
     assert sum(frame_bits(CODY)) <= 1.04 * 8320
-
-
-@pytest.mark.parametrize("file", [CODY, PAD], ids=["cody", "mpr121"])
-def test_every_taxel_is_where_the_file_says(file):
-    picture = PICTURE[: file.layout.rows, : file.layout.cols] % 400
-    floor = file.signal.dead_band_counts
-    with fake_skin(file, lambda t: picture) as skin:
-        frame = skin.read()
-    assert frame.valid.all()
-    np.testing.assert_array_equal(
-        frame.counts, np.where(picture < max(floor, 1), 0, picture)
-    )
 
 
 def test_buses_are_read_side_by_side_each_in_a_thread(monkeypatch):
@@ -153,13 +142,13 @@ def test_taxels_that_fall_silent_are_heard_of_and_so_is_their_return():
     intact."""
     file = SKINS["block"]
     hangs = Fault("hold", bus=file.buses[1].device, during=(0.1, 1.6))
-    heard = []
+    reports = []
     with faulty_skin(file, lambda t: PICTURE, [hangs]) as skin:
         for frame in Loop(skin, lasts_s=2.0).frames():
             silent = skin.silent_changes()
-            heard += [] if silent is None else [(round(frame.t, 2), silent)]
+            reports += [] if silent is None else [(round(frame.t, 2), silent)]
     hung_s = (UNCHANGED_FRAMES + SILENT_FRAMES) * 0.01
-    assert heard == [
+    assert reports == [
         (pytest.approx(0.1 + hung_s, abs=0.021), 128),
         (pytest.approx(1.6), 0),
     ]
@@ -184,3 +173,19 @@ def test_dead_taxels_are_not_silent():
     with still(replace(CODY, signal=signal)) as skin:
         assert not skin.read().valid[3, 4]
         assert not skin.invalid_for.any()
+
+
+def test_it_returns_no_sooner_than_it_was_asked_to():
+    clock = SystemClock()
+    moment = clock.now() + 0.002
+    clock.sleep_until(moment)
+    assert clock.now() >= moment
+
+
+def test_a_moment_that_has_passed_is_not_waited_for(monkeypatch):
+    clock = SystemClock()
+    slept = []
+    monkeypatch.setattr(time, "sleep", slept.append)
+    clock.sleep_until(clock.now() - 1.0)
+    clock.sleep_until(clock.now())
+    assert slept == []

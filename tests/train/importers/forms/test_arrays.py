@@ -15,21 +15,6 @@ FRAMES = np.arange(24).reshape(6, 4)
 
 
 @pytest.mark.parametrize(
-    ("stored", "form"),
-    [
-        ({"t": np.arange(6.0), "skin": FRAMES}, "time is axis 1 of skin"),
-        ({"t": np.arange(6.0), "skin": FRAMES.T}, "time is axis 2 of skin"),
-        ({"skin": FRAMES}, "time is axis 1 of skin"),
-    ],
-)
-def test_the_axis_of_time_is_that_of_the_other_arrays(stored, form):
-    table = table_of("a.mat", stored, OPTIONS)
-    assert form in table.form
-    skin = [name for name in table.names if name.startswith("skin")]
-    assert table.data[skin].to_numpy().tolist() == FRAMES.tolist()
-
-
-@pytest.mark.parametrize(
     ("stored", "sentence"),
     [
         ({"a": np.ones((6, 6)), "b": np.ones((6, 2))}, "which axis of a"),
@@ -64,9 +49,10 @@ def test_the_array_that_is_named_as_the_time_tells_the_frames():
 
 
 def of_structures(path):
-    trials = np.zeros(2, dtype=[("frames", "O"), ("label", "O")])
-    trials[0] = (FRAMES, "cup")
-    trials[1] = (FRAMES + 1, "pen")
+    trials = np.zeros(2, dtype=[("frames", "O"), ("label", "O"), ("camera", "O")])
+    camera = {"maker": "x", "lens": np.arange(3)}
+    trials[0] = (FRAMES, "cup", camera)
+    trials[1] = (FRAMES + 1, "pen", camera)
     savemat(path, {"trials": trials})
 
 
@@ -110,6 +96,7 @@ def of_cells_in_matlab_7_3(path):
 def trials_in(path):
     """The labels and the frames of the trials of a file."""
     trials = list(trials_of(read_arrays(File(path)), "object"))
+    assert {name for _, arrays in trials for name in arrays} == {"frames"}
     frames = [arrays["frames"].tolist() for _, arrays in trials]
     assert frames == [FRAMES.tolist(), (FRAMES + 1).tolist()]
     return [labels for labels, _ in trials]
@@ -132,21 +119,13 @@ def test_trials_are_cells_structures_groups_or_a_first_axis(tmp_path, write):
     assert trials_in(path) == [{"object": "cup"}, {"object": "pen"}]
 
 
-def test_a_structure_within_a_trial_is_left_out(tmp_path):
-    trial = {"frames": FRAMES, "camera": {"maker": "x", "lens": np.arange(3)}}
-    savemat(tmp_path / "a.mat", {"trials": np.array([trial, trial], dtype=object)})
-    trials = list(trials_of(read_arrays(File(tmp_path / "a.mat")), "object"))
-    assert [labels for labels, _ in trials] == [{}, {}]
-    assert [list(arrays) for _, arrays in trials] == [["frames"], ["frames"]]
-
-
 def test_arrays_with_other_numbers_of_trials_are_named():
     stored = {"a": np.ones((2, 3)), "b": np.array(1.0)}
     with pytest.raises(InputError, match="{'a': 2, 'b': 1} trials; leave out"):
         list(trials_of(stored, "object"))
 
 
-def written(path, array):
+def file_of(path, array):
     """A file of one array, packed where its format packs."""
     if path.suffix == ".npy":
         np.save(path, array)
@@ -173,7 +152,7 @@ def test_an_empty_data_set_of_hdf5_is_left_out(tmp_path):
 
 @pytest.mark.parametrize("suffix", [".npy", ".npz", ".mat", ".h5"])
 def test_what_would_fill_the_memory_is_refused_before(tmp_path, suffix, monkeypatch):
-    path = written(tmp_path / f"a{suffix}", np.zeros((100, 100), np.uint8))
+    path = file_of(tmp_path / f"a{suffix}", np.zeros((100, 100), np.uint8))
     monkeypatch.setattr(arrays, "MOST_VALUES", 5000)
     with pytest.raises(InputError, match="values, more than the 5000 that are read"):
         read_arrays(File(path))

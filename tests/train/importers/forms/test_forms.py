@@ -15,20 +15,6 @@ def tables_of(folder, name, data):
     return list(tables_in(folder / name, TableOptions()))
 
 
-@pytest.mark.parametrize(
-    ("line", "names"),
-    [
-        ("12:00:00.{i:03} -> {i},{j}", ["2", "3"]),
-        ("s1:{i}, s2: {j}", ["s1", "s2"]),
-        ("s1={i} s2={j}", ["s1", "s2"]),
-    ],
-)
-def test_lines_of_a_serial_monitor(tmp_path, line, names):
-    rows = [line.format(i=i, j=2 * i) for i in range(40)]
-    (table,) = tables_of(tmp_path, "cup.log", "\n".join(["Starting", *rows]))
-    assert table.data[names].to_numpy().tolist() == [[i, 2 * i] for i in range(40)]
-
-
 def test_a_restart_of_the_arduino_begins_another_trial(tmp_path):
     block = "CLEARDATA\nLABEL,p1,millis\nDATA,1,0\nDATA,2,10\n"
     names = [table.name for table in tables_of(tmp_path, "cup.csv", block * 2)]

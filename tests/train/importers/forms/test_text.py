@@ -25,9 +25,6 @@ def read(folder, content, name="a.csv"):
     ("content", "names"),
     [
         ("sep=;\nt;p1\n0;1\n1;2\n", ["t", "p1"]),
-        ("t,p1\n\n0,1\n\n# a pause\n1,2\n", ["t", "p1"]),
-        ("Rate,100\nUser,me\nt,p1\n0,1\n1,2\n2,3\n", ["t", "p1"]),
-        ("t,p1,\n0,1,\n1,2,\n", ["t", "p1"]),
         ("t,Unnamed: 1,p1\n0,,1\n1,7,2\n", ["t", "column 2 unnamed", "p1"]),
         ("t,1,2\n0,5,5\n1,5,5\n", ["t", "1", "2"]),
         # A first row of values is no header.

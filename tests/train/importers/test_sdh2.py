@@ -64,7 +64,7 @@ def dsa(
     )
 
 
-def written(folder, text, name="cup_1.dsa"):
+def write(folder, text, name="cup_1.dsa"):
     file = folder / "cup" / name
     file.parent.mkdir(parents=True, exist_ok=True)
     file.write_bytes(bz2.compress(text.encode()) if isinstance(text, str) else text)
@@ -72,7 +72,7 @@ def written(folder, text, name="cup_1.dsa"):
 
 
 def test_a_grasp_is_unpacked_cell_by_cell(tmp_path):
-    recording = sdh2.grasp(written(tmp_path, dsa()))
+    recording = sdh2.grasp(write(tmp_path, dsa()))
     left = recording.frames[:, :, :6]
     right = recording.frames[:, :, 7:]
     assert left.reshape(3, -1)[:, 8:10].tolist() == [[0, 0], [70, 80], [170, 180]]
@@ -85,7 +85,7 @@ def test_a_grasp_is_unpacked_cell_by_cell(tmp_path):
 
 
 def test_masked_texels_and_the_column_between_the_pads_are_dead(tmp_path):
-    recording = sdh2.grasp(written(tmp_path, dsa()))
+    recording = sdh2.grasp(write(tmp_path, dsa()))
     assert not recording.valid[:, 6].any()
     assert not recording.valid[:5, [0, 5]].any()
     assert recording.valid.sum() == (13 * 6 - 10) + 13 * 6
@@ -93,10 +93,10 @@ def test_masked_texels_and_the_column_between_the_pads_are_dead(tmp_path):
 
 
 def test_joint_angles_are_interpolated_in_radians_and_unknown_far_from_them(tmp_path):
-    recording = sdh2.grasp(written(tmp_path, dsa(stamps=(1000, 1032, 1164))))
+    recording = sdh2.grasp(write(tmp_path, dsa(stamps=(1000, 1032, 1164))))
     assert recording.joints[:2, 3] == pytest.approx([0.0, math.radians(90 * 32 / 40)])
     assert np.isnan(recording.joints[2]).all()
-    assert sdh2.grasp(written(tmp_path, dsa(angles=()))).joints is None
+    assert sdh2.grasp(write(tmp_path, dsa(angles=()))).joints is None
 
 
 @pytest.mark.parametrize(
@@ -118,7 +118,7 @@ def test_joint_angles_are_interpolated_in_radians_and_unknown_far_from_them(tmp_
     ],
 )
 def test_a_damaged_file_is_one_sentence_that_names_it(content, word, tmp_path, refused):
-    file = written(tmp_path, content)
+    file = write(tmp_path, content)
     message = refused("sdh2", tmp_path)
     assert word in message
     assert "cup" in message
@@ -129,7 +129,7 @@ def test_a_damaged_file_is_one_sentence_that_names_it(content, word, tmp_path, r
 def three_grasps(tmp_path):
     """The folder of three imported grasps."""
     for i in range(3):
-        written(tmp_path, dsa(), f"cup_{i}.dsa")
+        write(tmp_path, dsa(), f"cup_{i}.dsa")
     out = tmp_path / "out"
     assert main(["import", "sdh2", str(tmp_path), "--out", str(out)]) == 0
     return out

@@ -1,7 +1,6 @@
 """Simulated foam held against answers that are known: its creep, its bed, its layer."""
 
 from dataclasses import replace
-from fractions import Fraction
 
 import numpy as np
 import pytest
@@ -32,27 +31,6 @@ class TestRelaxation:
         rise = 1.0 - np.exp(-ramp / tau)
         z = ratio * k * rate * tau * rise * np.exp(-(t - ramp) / tau)
         assert_allclose(trace.force, k * rate * ramp + z, rtol=1e-8)
-
-
-class TestBed:
-    def test_the_closed_form_is_the_bed_in_fractions(self):
-        rng = np.random.default_rng(11)
-        for furthest in [50, 4000] * 20:
-            gaps = np.sort(rng.integers(0, 50, 5)) / 1024.0
-            k = 2.0 ** rng.integers(-3, 30, 5)
-            c = float(2.0 ** rng.integers(-12, 2))
-            free = float(rng.integers(1, furthest)) / 1024.0
-            law = gaps[:, None], *contact.bed_law(gaps[:, None], k[:, None])
-            (force,) = contact.closed_form(*law, np.array([free]), np.array([c]))
-            best = total_k = total_b = Fraction(0)
-            for g, s in zip(gaps, k, strict=True):
-                total_k += Fraction(s)
-                total_b += Fraction(s) * Fraction(g)
-                line = (total_k * Fraction(free) - total_b) / (
-                    1 + Fraction(c) * total_k
-                )
-                best = max(best, line)
-            assert force == pytest.approx(float(best), rel=1e-14, abs=1e-300)
 
 
 def layer_solution(half_width):

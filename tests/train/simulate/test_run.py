@@ -28,14 +28,14 @@ def demo():
 
 
 @pytest.fixture(scope="module")
-def written(demo, tmp_path_factory):
+def demo_files(demo, tmp_path_factory):
     folder = tmp_path_factory.mktemp("demo")
     return folder, write(demo, folder).paths
 
 
 @pytest.fixture(scope="module")
-def trial(written):
-    return load(written[0] / "cardboard-box-movable-01.npz")
+def trial(demo_files):
+    return load(demo_files[0] / "cardboard-box-movable-01.npz")
 
 
 def test_arms_may_halt_at_different_times_once_they_push():
@@ -79,10 +79,10 @@ def test_a_recordings_arrays_are_as_the_contract_says(demo, trial):
     assert trial.t[-1] >= touched + 2.0
 
 
-def test_a_second_run_writes_the_same_bytes(demo, written, tmp_path):
+def test_a_second_run_writes_the_same_bytes(demo, demo_files, tmp_path):
     steps = []
     write(demo, tmp_path, progress=steps.append)
-    assert digests(tmp_path) == digests(written[0])
+    assert digests(tmp_path) == digests(demo_files[0])
     assert sum(steps) == 16
 
 
@@ -94,11 +94,11 @@ def test_long_trials_are_simulated_fewer_side_by_side():
 
 
 def test_another_seed_gives_other_trials_and_fewer_trials_are_the_first(
-    written, tmp_path
+    demo_files, tmp_path
 ):
     write(scenes.load(DEMO, seed=99, count=1), tmp_path / "seed")
     write(scenes.load(DEMO, count=1), tmp_path / "fewer")
-    first_seed = digests(written[0])
+    first_seed = digests(demo_files[0])
     second_seed = digests(tmp_path / "seed")
     fewer = digests(tmp_path / "fewer")
     assert all(first_seed[name] != digest for name, digest in second_seed.items())
@@ -176,12 +176,14 @@ class TestCommand:
         path.write_text(
             "[trials]\ncount = 1\nafter_s = 0.3\n[step_s]\nbase = 0.01\n"
             '[[object]]\nname = "foam"\nfamily = "foam"\nconditions = ["fixed"]\n'
+            '[[object]]\nname = "wall"\nfamily = "rigid"\nconditions = ["fixed"]\n'
         )
         assert main(["simulate", str(path), "--explain"]) == 0
         out, err = capsys.readouterr()
         line = next(x for x in out.splitlines() if "lateral" in x)
         assert "family foam" in line
         assert "foam-fixed: 1 trials" in out
+        assert out.count("  viscous") == 1
         assert "not called for, and not loaded: cover, pop" in err
 
     @pytest.mark.parametrize(

@@ -16,10 +16,7 @@ from edge.decide.events import Decided, Onset
 from edge.decide.model import Model
 from edge.record.recording import load
 from edge.record.saving import save
-from edge.touch.arm import Chain
 from edge.touch.frame import Frame
-from edge.touch.layout import SkinLayout
-from edge.touch.track import MAX_CONTACTS, ContactTracker
 from tests.conftest import ROOT, export, save_touches
 
 PLACES = [(row, col) for row in (0, 4, 8, 12) for col in (0, 6, 12, 18)]
@@ -123,57 +120,6 @@ def test_the_first_decision_imports_little():
 
 
 MODEL = Model(demo.MODEL)
-FLAT = SkinLayout(rows=6, cols=20, threshold_counts=10, onset_counts=20, release_s=0.05)
-
-
-MERGED, PARTED = ".######", "##.###"
-FLICKER = "/".join(["#." * 10, ".#" * 10] * 3)
-
-
-@pytest.mark.parametrize(
-    ("pictures", "areas", "ended"),
-    [
-        # Two regions are two contacts, also where the later one is larger.
-        (
-            ["##", "##", *["##....####"] * 2, "#.....####"],
-            [[2, 2, 2, 2, 1], [4, 4, 4]],
-            [0, 0],
-        ),
-        # A region that moves by its width goes on.
-        (["#", "#", ".#", "..#", "..#"], [[1] * 5], [0]),
-        # Where two grow into one, the older goes on and the other ends.
-        (
-            [".##", *[".##...##"] * 2, *[MERGED] * 5],
-            [[2, 2, 2, 6, 6, 6, 6, 6], [2, 2, 0, 0, 0, 0, 0]],
-            [0, 1],
-        ),
-        # Where one parts in two, the larger share goes on.
-        (["######", "######", PARTED, PARTED], [[6, 6, 3, 3], [2, 2]], [0, 0]),
-        # A region apart from where a contact was is another one.
-        (["##", "##", *["...##"] * 2], [[2, 2, 0, 0], [2, 2]], [0, 0]),
-        # A region below the onset count begins nothing.
-        (["++", "++", "++"], [], []),
-        # A contact ends by itself while another goes on.
-        (
-            [*["#....##"] * 2, *[".....##"] * 5],
-            [[2] * 7, [1, 1, 0, 0, 0, 0, 0]],
-            [0, 1],
-        ),
-        # A skin that flickers has no more than so many contacts.
-        ([FLICKER] * 3, [[1] * 3] * MAX_CONTACTS, [0] * MAX_CONTACTS),
-    ],
-)
-def test_each_region_is_a_contact_of_its_own(pictures, areas, ended):
-    """Pictures are rows of taxels: '#' has 100 counts, '+' 15, '.' none."""
-    tracks = ContactTracker(FLAT, max_contacts=MAX_CONTACTS)
-    levels = {"#": 100, "+": 15, ".": 0}
-    for i, picture in enumerate(pictures):
-        counts = np.zeros(FLAT.shape, dtype=np.uint16)
-        for r, row in enumerate(picture.split("/")):
-            counts[r, : len(row)] = [levels[taxel] for taxel in row]
-        contacts = list(tracks.push(Frame(i / 100, counts)))
-    assert [contact.series().area.tolist() for contact in contacts] == areas
-    assert [contact.ended for contact in contacts] == ended
 
 
 def test_a_single_contact_is_followed_as_by_the_largest_region():
@@ -193,7 +139,7 @@ def stripped(events):
 
 
 def strip(event):
-    unequal = ("contact", "place", "latency_ms")
+    unequal = ("contact", "position", "latency_ms")
     return {key: value for key, value in event.items() if key not in unequal}
 
 
@@ -230,7 +176,7 @@ def test_each_contact_is_decided_and_placed_on_its_own(two_touches, tmp_path, ed
     }
     late_s = second[0]["onset_s"] - first[0]["onset_s"]
     assert late_s == pytest.approx(0.36, abs=0.02)  # 0.04 their own
-    places = [first[0]["place"], second[0]["place"]]
+    places = [first[0]["position"], second[0]["position"]]
     # Opposite sides of the forearm.
     assert np.linalg.norm(np.subtract(*places)) > two_touches.layout.radius_m
 
@@ -242,16 +188,3 @@ def by_contact(lines):
         if line["event"] == "decision":
             contacts[line["contact"]].append(line)
     return [contacts[number] for number in sorted(contacts)]
-
-
-def test_a_place_is_the_centroid_turned_and_moved_by_the_arm():
-    layout = replace(FLAT, pitch_m=0.01)
-    chain = Chain.cody()
-    joints = np.array([0.1, -0.2, 0.3, 0.4, -0.5])
-    tracks = ContactTracker(layout, chain=chain, max_contacts=2)
-    counts = np.zeros(FLAT.shape, dtype=np.uint16)
-    counts[2, 3:5] = 100
-    for i in range(2):
-        (*_, contact) = [None, *tracks.push(Frame(i / 100, counts, joints=joints))]
-    expected = (chain.pose(joints) @ [0.035, 0.02, 0.0, 1.0])[:3]
-    assert contact.position() == pytest.approx(expected, abs=1e-15)

@@ -75,17 +75,27 @@ def test_a_call_that_the_kernel_completes_in_part_is_no_reading(library, tmp_pat
     ), process.stderr
 
 
-def test_a_single_message_that_nobody_takes_is_an_error_with_its_address(library):
+def test_a_message_that_nobody_takes_or_on_a_closed_bus_is_an_error_with_its_address(
+    library,
+):
     process = run(
         library,
         """
         from edge.wire.bus.linux import LinuxBus
-        from edge.wire.bus.protocol import write
+        from edge.wire.bus.protocol import BusError, write
         bus = LinuxBus("/dev/i2c-1")
-        bus.transfer(bus.prepare(write(0x11, [0])))
+        unanswered = bus.prepare(write(0x11, [0]))
+        try:
+            bus.transfer(unanswered)
+        except BusError as error:
+            print(error)
+        bus.close()
+        bus.prepare(write(0x12, [0]))
+        bus.transfer(unanswered)
         """,
     )
-    assert "BusNack: /dev/i2c-1, address 0x11" in process.stderr
+    assert process.stdout.startswith("/dev/i2c-1, address 0x11: does not answer")
+    assert "BusGone: /dev/i2c-1, address 0x11" in process.stderr
 
 
 def test_a_bus_that_another_program_uses_is_refused(library):
