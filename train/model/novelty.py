@@ -3,7 +3,9 @@
 Doubt has a space of its own, in which the choice of settings has no part: each column
 of the features is centred, divided by its standard deviation and cut off, and projected
 to principal components, which all decision points share. They are whitened by the
-spread within a label (Mahalanobis).
+spread within a label (Mahalanobis), or within a cluster of one where trials are many:
+centres that stand for trials show things that were never met as well as all trials do,
+if what varies between the clusters of a label counts little.
 
 Two scores are taken there, of the distance to the nearest training trial over that at
 which this trial and its label have their own neighbours (as the local outlier factor of
@@ -54,6 +56,8 @@ TAIL = 10
 FOLDS = 20
 """Folds of the held-out scores: more than a choice has, as a space of fewer trials finds
 all others newer."""
+FOLDS_OF_MANY = 10
+"""Where few rows stand for many trials, which a space of fewer trials has as well."""
 MOST_COMPONENTS = 40
 TRIALS_A_COMPONENT = 3
 """A component needs so many trials."""
@@ -66,6 +70,8 @@ REMOUNT_RAD = math.radians(2.0)
 """By so much a joint's zero lies off once an arm was taken off and put on again."""
 MOST_CENTRES = 250
 """Centres of clusters; more would make a file of eleven decision points exceed 2 MB."""
+TURNS = 2
+"""Times that clusters are made, each by the whitening of those before."""
 CLIP = 6.0
 """Standard deviations at which a column is cut off."""
 STEP_BITS = 12
@@ -164,19 +170,16 @@ class NoveltySpace:
         # Half of the columns, so that something can lie outside the components.
         most = min(MOST_COMPONENTS, len(labels) // TRIALS_A_COMPONENT, columns // 2)
         is_wide = len(X) * len(labels) < X.shape[-1]
-        axes = (_axes_of_few if is_wide else _axes)(steps(), max(most, 1))
+        # Of many trials, every second, third and so on tells the components.
+        some = (of_point[:: -(-len(labels) // MOST_ROWS)] for of_point in steps())
+        axes = (_axes_of_few if is_wide else _axes)(some, max(most, 1))
         shift = _shift(axes, STORED_BITS)
         weights = np.rint(np.ldexp(axes, shift))
-        points = []
-        z = _product(_steps(X[-1][trials], *scales[-1]), weights, shift)
-        of_trials = np.arange(len(z))
-        if len(z) > MOST_ROWS:
-            count = max(MOST_CENTRES // len(np.unique(labels)), 1)
-            of_trials = clusters(z, labels, count)
-        for scale, of_point in zip(scales, steps(), strict=True):
-            z = _product(of_point, weights, shift)
-            points.append(_point(*scale, z, labels, of_trials))
-        return cls(weights, shift, tuple(points))
+        points = tuple(
+            _point(*scale, _product(of_point, weights, shift), labels)
+            for scale, of_point in zip(scales, steps(), strict=True)
+        )
+        return cls(weights, shift, points)
 
     def scores(self, X: Floats) -> Scores:
         """The scores of vectors (decision points, m, p)."""
@@ -294,36 +297,52 @@ def _coordinates(z: Floats, whitening: Floats, shift: int) -> Floats:
     return np.asarray(np.clip(integers, -FARTHEST, FARTHEST))
 
 
-def _point(
-    mean: Floats, gain: Floats, z: Floats, labels: Strings, of_trials: Integers
-) -> NoveltyPoint:
-    """The constants of a decision point at which trials have the components z, and are
-    of these clusters (n,)."""
+def _point(mean: Floats, gain: Floats, z: Floats, labels: Strings) -> NoveltyPoint:
+    """The constants of a decision point at which trials have the components z."""
     names, classes = np.unique(labels, return_inverse=True)
     means = np.stack([z[classes == i].mean(axis=0) for i in range(len(names))])
-    within = z - means[classes]
-    components = z.shape[1]
-    covariance = within.T @ within / len(z)
-    variance = max(float(np.trace(covariance)) / components, 1.0)
-    covariance *= 1.0 - SHRINKAGE
-    covariance += SHRINKAGE * variance * np.eye(components)
-    values, axes = np.linalg.eigh(covariance)
-    whitening = axes / np.sqrt(values)
     between = (means - z.mean(axis=0)) * np.sqrt(np.bincount(classes))[:, None]
-    whitening, directions = _turned(whitening, between)
-    weights = np.where(np.arange(components) < directions, 1.0, BESIDE)
+    whitening, weights = _whitening(z - means[classes], between)
+    of_trials = np.arange(len(z))
+    if len(z) > MOST_ROWS:
+        count = max(MOST_CENTRES // len(names), 1)
+        for _ in range(TURNS):
+            of_trials = clusters(z @ whitening * weights, labels, count)
+            within = z - _centres(z, of_trials)[of_trials]
+            whitening, weights = _whitening(within, between)
     fine = _shift(whitening, WHITENING_BITS)
     integers = np.rint(np.ldexp(whitening, fine))
     shift = fine - _shift(z @ whitening, STORED_BITS - 1)
     y = _coordinates(z, integers, shift)
-    sizes = np.bincount(of_trials)
-    sums = [np.bincount(of_trials, column) for column in y.T]
-    rows = np.rint(np.stack(sums, axis=1) / sizes[:, None])
+    rows = np.rint(_centres(y, of_trials))
     labels = labels[np.unique(of_trials, return_index=True)[1]]
     nearness = _nearness(_alone(y, rows, of_trials, labels), labels)
     alone = _alone(y * weights, rows * weights, of_trials, labels)
     weighted = _nearness(alone, labels)
     return NoveltyPoint(mean, gain, integers, shift, rows, weights, nearness, weighted)
+
+
+def _centres(z: Floats, of_trials: Integers) -> Floats:
+    """(m, c) the means of clusters of z (n, c)."""
+    sums = [np.bincount(of_trials, column) for column in z.T]
+    return np.stack(sums, axis=1) / np.bincount(of_trials)[:, None]
+
+
+def _whitening(within: Floats, between: Floats) -> tuple[Floats, Floats]:
+    """A whitening (components, components), with its axes' weights in remoteness.
+
+    Args:
+        within: (n, components) deviations of trials from those that they are like.
+        between: (labels, components) weighted deviations of the labels.
+    """
+    components = within.shape[1]
+    covariance = within.T @ within / len(within)
+    variance = max(float(np.trace(covariance)) / components, 1.0)
+    covariance *= 1.0 - SHRINKAGE
+    covariance += SHRINKAGE * variance * np.eye(components)
+    values, axes = np.linalg.eigh(covariance)
+    whitening, directions = _turned(axes / np.sqrt(values), between)
+    return whitening, np.where(np.arange(components) < directions, 1.0, BESIDE)
 
 
 def _turned(whitening: Floats, between: Floats) -> tuple[Floats, int]:
@@ -335,10 +354,11 @@ def _turned(whitening: Floats, between: Floats) -> tuple[Floats, int]:
 
 def _alone(y: Floats, rows: Floats, of_trials: Integers, labels: Strings) -> Floats:
     """(n,) the distance of each row to the nearest one of its label, or the mean distance
-    of the trials y whose centre it is; infinite without any."""
+    of the trials y whose centre it is, each to that of the others; infinite without any."""
     if len(rows) < len(y):
         away = np.sqrt(((y - rows[of_trials]) ** 2).sum(axis=1))
-        means = np.bincount(of_trials, away) / np.bincount(of_trials)
+        others = np.bincount(of_trials) - 1
+        means = np.bincount(of_trials, away) / np.maximum(others, 1)
         return np.where(means > 0.0, means, np.inf)
     alone = np.full(len(rows), np.inf)
     for label in np.unique(labels):

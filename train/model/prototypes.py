@@ -65,19 +65,18 @@ def clusters(coordinates: Floats, labels: Strings, count: int) -> Integers:
     at most so many, which follow one another."""
     numbers = np.empty(len(labels), dtype=np.int64)
     first = 0
-    for label in np.unique(labels):
-        members = np.flatnonzero(labels == label)
-        places = _parts(coordinates[members], count)
-        numbers[members] = first + places
-        first += int(places.max()) + 1
+    with threadpool_limits(1):  # sums of several threads have other bits
+        for label in np.unique(labels):
+            members = np.flatnonzero(labels == label)
+            places = _parts(coordinates[members], count)
+            numbers[members] = first + places
+            first += int(places.max()) + 1
     return numbers
 
 
 def _parts(rows: Floats, count: int) -> Integers:
     """(n,) the part of each of some rows, numbered without a gap."""
     different = len(np.unique(rows, axis=0))
-    with threadpool_limits(1):  # sums of several threads have other bits
-        places = KMeans(min(count, different), n_init=1, random_state=SEED).fit_predict(
-            rows
-        )
+    parts = KMeans(min(count, different), n_init=1, random_state=SEED)
+    places = parts.fit_predict(rows)
     return np.asarray(np.unique(places, return_inverse=True)[1], dtype=np.int64)

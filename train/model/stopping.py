@@ -42,7 +42,7 @@ from edge.elementary import log
 from edge.errors import InputError
 from edge.features.vector import FEATURES
 from train.data.folds import finest, stratified_folds
-from train.data.vectors import Strings, Vectors
+from train.data.vectors import MOST_ROWS, Strings, Vectors
 from train.model.curves import Curve, Evidence, cross_fitted
 from train.model.held_out import (
     AtPoints,
@@ -61,6 +61,7 @@ from train.model.never_met import (
 )
 from train.model.novelty import (
     FOLDS,
+    FOLDS_OF_MANY,
     UNUSUAL_RATE,
     NoveltySpace,
     Scores,
@@ -245,7 +246,8 @@ class SequentialClassifier:
         least = least_deviations(vectors, self.drawn)
         with single_thread():
             self.space_ = NoveltySpace.of(vectors.X, labels, vectors.columns, least)
-        novelty_folds = np.where(folds >= 0, stratified_folds(labels, FOLDS), -1)
+        count = FOLDS if len(labels) <= MOST_ROWS else FOLDS_OF_MANY
+        novelty_folds = np.where(folds >= 0, stratified_folds(labels, count), -1)
 
         def scores_without(folds: Integers) -> Scores:
             return held_out_scores(

@@ -183,17 +183,24 @@ def test_few_trials_have_few_components():
     assert NoveltySpace.of(X, labels, WIDTHS).weights.shape[1] <= MOST_COMPONENTS
 
 
-def test_of_many_trials_the_centres_of_clusters_are_compared(monkeypatch):
+def test_of_many_trials_what_lies_between_the_poses_of_a_label_is_remote(monkeypatch):
     monkeypatch.setattr(novelty, "MOST_ROWS", 20)
-    monkeypatch.setattr(novelty, "MOST_CENTRES", 20)
-    X, labels = trials(200)
-    space = NoveltySpace.of(X, labels, WIDTHS)
-    new, _ = trials(40, seed=5)
-    for point, of_known, of_far in zip(
-        space.points,
-        space.scores(new).remoteness,
-        space.scores(3.0 * new).remoteness,
-        strict=True,
-    ):
-        assert len(point.rows) == 20
-        assert np.median(of_far) > 2.0 * np.median(of_known)
+    monkeypatch.setattr(novelty, "MOST_CENTRES", 24)
+    hidden = np.random.default_rng(0).normal(size=(2, 400, 6))
+    labels = np.array(list("ab"))[np.arange(400) % 2]
+    mixing = np.random.default_rng(1).normal(size=(6, 30))
+    pose = np.where(np.arange(400) % 4 < 2, 10.0, -10.0)
+    hidden[..., 0] += np.where(labels == "a", 0.0, 40.0) + pose
+    space = NoveltySpace.of((hidden @ mixing)[:, :200], labels[:200], WIDTHS)
+    known = hidden[:, 200:]
+    between = known - [10.0, 0.0, 0.0, 0.0, 0.0, 0.0] * np.sign(pose[200:, None])
+    limits = np.quantile(space.scores(known @ mixing).remoteness, 0.99, axis=1)
+    medians = np.median(space.scores(between @ mixing).remoteness, axis=1)
+    assert (medians > 2.0 * limits).all()
+
+
+def test_a_trial_is_as_far_from_a_centre_as_if_it_had_no_part_in_it():
+    y = np.array([[0.0], [2.0], [10.0], [16.0], [30.0]])
+    rows = np.array([[1.0], [13.0], [30.0]])
+    alone = novelty._alone(y, rows, np.array([0, 0, 1, 1, 2]), np.array(list("aab")))
+    assert alone.tolist() == [2.0, 6.0, np.inf]
