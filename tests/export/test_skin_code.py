@@ -2,6 +2,7 @@
 frame."""
 
 import ctypes
+import errno
 import json
 import math
 import random
@@ -321,6 +322,13 @@ def test_under_each_fault_every_transaction_and_frame_is_that_of_python(name, tm
             assert_same(file, tmp_path, faults, scene, 90, **more)
 
 
+def test_an_adapter_that_refuses_a_transaction_of_any_chip_does_not_start(tmp_path):
+    file = FILES["one small bus"]
+    refused = [Fault(code=errno.EINVAL, address=0x2D)]
+    rows = assert_same(file, tmp_path, [], touches(file), 9, at_start=refused)
+    assert rows[0] == [False]
+
+
 def test_lone_and_held_taxels_and_drift_are_those_of_python(tmp_path):
     """One is alone for three seconds and is broken, one from the start for half of one;
     a region is held for thirteen, and all drift. All limits of time are met exactly."""
@@ -383,7 +391,7 @@ SCENES = {
     "saturated": (pressed((0, 0), by=60000), 2.0, (1, 1)),
     "noisy": (pressed(), 9.0, (4, 4)),
     "restless": (
-        lambda t: pressed((0, 5), by=200 * (int(t * 100) % 2))(t),
+        lambda t: pressed((0, 0), by=200 * (int(t * 100) % 2))(t),
         2.0,
         (2, 2),
     ),
