@@ -116,7 +116,7 @@ def _calibration(fitted: Fitted) -> dict[str, Any]:
     return {
         "decision_points_s": tuple(sequential.decision_points_s),
         "stopping": sequential.stopping_,
-        "novelty": sequential.novelty_,
+        "outlier_score": sequential.outlier_score_,
         "usual": usual_ranges(fitted.dataset, fitted.window_s, fitted.samples),
     }
 
@@ -138,7 +138,7 @@ def _task(fitted: Fitted, task: str) -> Task:
         features=tuple(n for n in fitted.dataset.names if n in choice.features),
         left_out=TRIAL if chosen is None else chosen.held_out,
         no_contact=NO_CONTACT if NO_CONTACT in labels else None,
-        factors=classifier.products_.get(task, {}),
+        factors=classifier.joint_tasks_.get(task, {}),
     )
 
 

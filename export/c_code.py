@@ -1,5 +1,5 @@
-"""A model as C99 for a microcontroller: the files of `export/c`, of which `model.h` takes
-the sizes and `model.c` the bytes of `model.bin`, the model as data."""
+"""A model as C99 for a microcontroller: the files of `export/c`, of which `model.h`
+takes the sizes and `model.c` the bytes of `model.bin`, the model as data."""
 
 from __future__ import annotations
 
@@ -62,7 +62,7 @@ def export(
         error: the accepted share of wrong decisions, for early ones; None decides at
             the full window, and leaves out the tables of the other decision points.
         flash_kb: kilobytes that tables and code may take. What does not fit leaves out
-            early decisions first, then novelty.
+            early decisions first, then the outlier score.
 
     Raises:
         InputError: C lacks something that the model needs, the error rate is not
@@ -75,9 +75,9 @@ def export(
     if source.costs.flash > limit and error is not None:
         left_out += "; early decisions are left out to fit --flash"
         source = Source(model)
-    if source.costs.flash > limit and model.info.novelty is not None:
+    if source.costs.flash > limit and model.info.outlier_score is not None:
         left_out += (
-            "; novelty is left out to fit --flash: nothing is unusual or unknown, and "
+            "; the outlier score is left out to fit --flash: nothing is unusual or unknown, and "
             "confidence is that of a usual touch"
         )
         source = Source(model, doubts=False)
@@ -106,7 +106,7 @@ class Source:
         Args:
             model: the model.
             error: as for `export`.
-            doubts: with novelty and remoteness.
+            doubts: with the outlier score and the distance to known objects.
 
         Raises:
             InputError: as `export`.
@@ -121,8 +121,8 @@ class Source:
         self._zones = zones_of(self._types)
         self._pools = Pools()
         rules = {} if error is None else stopping_rules(model, error)
-        has_novelty = doubts and model.info.novelty is not None
-        formula = Formula(model, points, self._pools, rules, has_novelty)
+        has_outliers = doubts and model.info.outlier_score is not None
+        formula = Formula(model, points, self._pools, rules, has_outliers)
         self._tables: dict[str, Any] = {
             **formula.tables,
             "windows_s": [model.decision_points_s[i] for i in points],
@@ -191,7 +191,7 @@ class Source:
             debounce=info.debounce,
             repeats=info.repeats,
             early=early,
-            calibrated=info.novelty is not None,
+            calibrated=info.outlier_score is not None,
             naming=formula.naming,
             text=self._pools.text(info.name or ""),
             checksum=checksum(model) if formula.trials else 0,
@@ -332,8 +332,9 @@ def program(layout: SkinLayout) -> int:
 
 
 def checksum(model: Model) -> int:
-    """What `ec_selftest` in `export/c/decide.c` compares: FNV-1a of elementary functions
-    and of the outputs for features that are all `PROBE`, at the full window."""
+    """What `ec_selftest` in `export/c/decide.c` compares: FNV-1a of elementary
+    functions and of the outputs for features that are all `PROBE`, at the full
+    window."""
     last = max(len(model.decision_points_s) - 1, 0)
     values = model.run(np.full((1, model.info.width), PROBE), last)
     ends = ("label", "distances")

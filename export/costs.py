@@ -11,8 +11,8 @@ from edge.features.kernels import CONVOLUTIONS
 from export.image import NOWHERE, SIZES, Image
 
 BOARDS = {"Cortex-M4F": 64, "Cortex-M0+": 133}
-"""{processor: usual MHz}, in the order of the instructions below, which are fitted to what
-QEMU counted with gcc 12 and -Os."""
+"""{processor: usual MHz}, in the order of the instructions below, which are fitted to
+what QEMU counted with gcc 12 and -Os."""
 CODE_BYTES = 28 * 1024
 """Of all rooms, with the arithmetic of doubles, of a Cortex-M0+."""
 DECISION = {
@@ -70,8 +70,8 @@ class Costs:
         self.frame = _weighed(FRAME, of_frame)
 
     def __str__(self) -> str:
-        """Flash and RAM, and for each of `BOARDS` the time of a decision and the rate at
-        which a frame and a slice of a decision fit."""
+        """Flash and RAM, and for each of `BOARDS` the time of a decision and the rate
+        at which a frame and a slice of a decision fit."""
         parts = [
             f"{self.flash / 1024:.0f} kB of flash",
             f"{self.ram / 1024:.0f} kB of RAM",
@@ -99,7 +99,7 @@ def _work(image: Image, sizes: Mapping[str, int], trials: int) -> dict[str, int]
     """How much of each part of a decision there is at the full window."""
     tables = image.tables
     words = tables["words"].astype(int)
-    doubts = tables["doubts"][-1:][: sizes["has_novelty"]]["projection"]
+    doubts = tables["doubts"][-1:][: sizes["has_outliers"]]["projection"]
     spaces = tables["projections"][-sizes["spaces"] :]
     rows, components = (
         np.concatenate([spaces[name], doubts[name]]).astype(int)

@@ -25,7 +25,7 @@ class Formula:
         tables: {name: its records}: projections, tasks, places and doubts.
         sizes: fields of the `ec_sizes`.
         trials: how many there are.
-        naming: the task that names things; `NOWHERE` where nothing is unknown.
+        naming: the task that names objects; `NOWHERE` where nothing is unknown.
     """
 
     def __init__(
@@ -34,7 +34,7 @@ class Formula:
         points: Sequence[int],
         pools: Pools,
         rules: Mapping[str, StoppingRule | None],
-        has_novelty: bool,
+        has_outliers: bool,
     ) -> None:
         """Read the constants.
 
@@ -43,7 +43,8 @@ class Formula:
             points: the decision points that are kept.
             pools: take the numbers.
             rules: of the tasks, for early decisions.
-            has_novelty: whether novelty and remoteness are kept.
+            has_outliers: whether the outlier score and the distance to known objects are
+                kept.
 
         Raises:
             InputError: C cannot take a number.
@@ -65,8 +66,8 @@ class Formula:
         places = {
             (point, name): self._place(name, point) for point in points for name in wide
         }
-        self.naming = self._naming() if has_novelty else NOWHERE
-        doubts = [self._doubt(point) for point in points] if has_novelty else []
+        self.naming = self._naming() if has_outliers else NOWHERE
+        doubts = [self._doubt(point) for point in points] if has_outliers else []
         self.tables = {
             "projections": projections,
             "tasks": of_tasks,
@@ -84,7 +85,7 @@ class Formula:
             "nearest": max((int(at.numbers(n, 1).sum()) for n in near), default=0),
             "components": max(widths),
             "spaces": self._spaces,
-            "has_novelty": has_novelty,
+            "has_outliers": has_outliers,
         }
 
     def _projections(self, at: Constants) -> list[Array]:
@@ -129,25 +130,25 @@ class Formula:
         )
 
     def _naming(self) -> int:
-        """The task that names things; `NOWHERE` where nothing is unknown."""
+        """The task that names objects; `NOWHERE` where nothing is unknown."""
         for i, name in enumerate(self._info.tasks):
             stopping = self._info.stopping.get(name)
-            if stopping is not None and stopping.remoteness is not None:
+            if stopping is not None and stopping.known_distance is not None:
                 return i
         return NOWHERE
 
     def _limits(self, point: int) -> dict[str, float]:
         """The limits of the scores of doubt at a decision point."""
         info = self._info
-        assert info.novelty is not None
+        assert info.outlier_score is not None
         limits = {
-            "typical": info.novelty.typical[point],
-            "novel": info.novelty.limits[point],
+            "typical": info.outlier_score.typical[point],
+            "outlying": info.outlier_score.limits[point],
         }
         if self.naming != NOWHERE:
-            far = info.stopping[[*info.tasks][self.naming]].remoteness
+            far = info.stopping[[*info.tasks][self.naming]].known_distance
             assert far is not None
-            limits["remote"] = far.limits[point]
+            limits["far"] = far.limits[point]
             limits["middle"] = far.middles[point]
             limits["slope"] = far.slopes[point]
         return limits
@@ -156,29 +157,29 @@ class Formula:
         """The `ec_doubt` of a decision point."""
         pools = self._pools
         at = self._points[point]
-        weights = at.numbers("novelty weights", 2)
+        weights = at.numbers("outlier weights", 2)
         matrix, shift = pools.matrix(weights)
         projection = record(
             "ec_projection",
-            most_steps=at.numbers("novelty most steps"),
-            factor=at.numbers("novelty factor") * 2.0**-shift,
-            means=pools.series(at.numbers("novelty means", 1)),
-            gains=pools.series(at.numbers("novelty gains", 1)),
+            most_steps=at.numbers("outlier most steps"),
+            factor=at.numbers("outlier factor") * 2.0**-shift,
+            means=pools.series(at.numbers("outlier means", 1)),
+            gains=pools.series(at.numbers("outlier gains", 1)),
             columns=NOWHERE,
             matrix=matrix,
             count=len(weights),
             components=weights.shape[1],
         )
-        whitening, fine = pools.matrix(at.numbers("novelty whitening", 2))
-        rows, _ = pools.matrix(at.numbers("novelty coordinates", 2) / -2.0)
-        squares = at.numbers("remoteness weights", 1) ** 2
+        whitening, fine = pools.matrix(at.numbers("outlier whitening", 2))
+        rows, _ = pools.matrix(at.numbers("outlier coordinates", 2) / -2.0)
+        squares = at.numbers("known weights", 1) ** 2
         return record(
             "ec_doubt",
             projection=projection,
-            factor=at.numbers("novelty whitening factors") * 2.0**-fine,
-            limit=at.numbers("novelty limit"),
-            nearness=pools.series(at.numbers("novelty nearness", 1)),
-            weighted_nearness=pools.series(at.numbers("remoteness nearness", 1)),
+            factor=at.numbers("outlier whitening factors") * 2.0**-fine,
+            limit=at.numbers("outlier limit"),
+            nearness=pools.series(at.numbers("outlier nearness", 1)),
+            weighted_nearness=pools.series(at.numbers("known nearness", 1)),
             whitening=whitening,
             rows=rows,
             weights=pools.add("words", squares * 2.0**FRACTION_BITS),

@@ -24,12 +24,12 @@ from edge.decide.info import METADATA_KEY, ModelInfo
 from edge.decide.metadata import to_json
 from edge.decide.onnx_file import DIGEST, OPSET
 from export.build import Builder, project, widened
-from train.model.novelty import (
+from train.model.outlier_score import (
     CLIP,
     FARTHEST,
     STEP_BITS,
-    NoveltyPoint,
-    NoveltySpace,
+    OutlierPoint,
+    OutlierSpace,
 )
 from train.model.pipeline import ContactClassifier, FittedSpace
 from train.model.stopping import SequentialClassifier
@@ -240,55 +240,56 @@ def _task(
         _label_distances(build, task, squares, labels, last.counts, scales)
 
 
-def _doubt(build: Builder, space: NoveltySpace) -> None:
+def _doubt(build: Builder, space: OutlierSpace) -> None:
     """Nodes that score how unlike all training trials features (n, p) are, by their
-    novelty and remoteness; see `train.model.novelty`."""
+    the outlier score and the distance to known objects; see
+    `train.model.outlier_score`."""
     points = space.points
-    means = build.by_decision_point_small([p.mean for p in points], "novelty means")
+    means = build.by_decision_point_small([p.mean for p in points], "outlier means")
     centred = build.node("Sub", "features", means)
-    gains = build.by_decision_point_small([p.gain for p in points], "novelty gains")
+    gains = build.by_decision_point_small([p.gain for p in points], "outlier gains")
     rounded = build.node("Round", build.node("Mul", centred, gains))
     most = [CLIP * 2.0**STEP_BITS]
-    steps, _ = build.clipped(rounded, most, "novelty most steps")
-    weights = build.by_decision_point_small([space.weights], "novelty weights")
-    z = build.shifted(steps, weights, [space.shift], "novelty factor")
+    steps, _ = build.clipped(rounded, most, "outlier most steps")
+    weights = build.by_decision_point_small([space.weights], "outlier weights")
+    z = build.shifted(steps, weights, [space.shift], "outlier factor")
     squares = build.squared_length(steps)
     outside = build.node("Sub", squares, build.squared_length(z))
     outside = build.node("Max", outside, 1.0)
     whitening = build.by_decision_point_small(
-        [p.whitening for p in points], "novelty whitening"
+        [p.whitening for p in points], "outlier whitening"
     )
     shifts = [p.shift for p in points]
-    y = build.shifted(z, whitening, shifts, "novelty whitening factors")
-    y, _ = build.clipped(y, [FARTHEST], "novelty limit")
+    y = build.shifted(z, whitening, shifts, "outlier whitening factors")
+    y, _ = build.clipped(y, [FARTHEST], "outlier limit")
     # Twice the rows, so that |row|^2 - 2 row.y needs no further product.
     columns = build.by_decision_point_small(
-        [-2.0 * p.rows.T for p in points], "novelty coordinates"
+        [-2.0 * p.rows.T for p in points], "outlier coordinates"
     )
     lengths = [(p.rows**2).sum(axis=1) for p in points]
-    squares = _squares(build, "novelty lengths", y, y, columns, lengths)
-    nearest = _nearest(build, squares, [p.nearness for p in points], "novelty nearness")
+    squares = _squares(build, "outlier lengths", y, y, columns, lengths)
+    nearest = _nearest(build, squares, [p.nearness for p in points], "outlier nearness")
     score = build.node("Mul", build.node("Sqrt", outside), nearest)
-    build.node("Squeeze", score, [1], output="novelty")
-    _remoteness(build, y, columns, points)
+    build.node("Squeeze", score, [1], output="outlier_score")
+    _known_distance(build, y, columns, points)
 
 
-def _remoteness(
+def _known_distance(
     build: Builder,
     y: str,
     columns: str,
-    points: Sequence[NoveltyPoint],
+    points: Sequence[OutlierPoint],
 ) -> None:
-    """Nodes from whitened coordinates y (n, c) to the remoteness."""
-    weights = build.by_decision_point([p.weights for p in points], "remoteness weights")
+    """Nodes from whitened coordinates y (n, c) to the distance to known objects."""
+    weights = build.by_decision_point([p.weights for p in points], "known weights")
     weighted = build.node("Mul", y, weights)
     # The rows are stored once: their weights stand beside those of y.
     factor = build.node("Mul", weighted, weights)
     lengths = [((p.rows * p.weights) ** 2).sum(axis=1) for p in points]
-    squares = _squares(build, "remoteness lengths", weighted, factor, columns, lengths)
+    squares = _squares(build, "known lengths", weighted, factor, columns, lengths)
     nearness = [p.weighted_nearness for p in points]
-    root = _nearest(build, squares, nearness, "remoteness nearness")
-    build.node("Squeeze", root, [1], output="remoteness")
+    root = _nearest(build, squares, nearness, "known nearness")
+    build.node("Squeeze", root, [1], output="known_distance")
 
 
 def _nearest(

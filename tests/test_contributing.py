@@ -1,7 +1,8 @@
 """CONTRIBUTING.md: its table is true, and a toy of each kind is added as it says.
 
-`tests/edge/wire/chips/test_kinds.py` adds a chip, `tests/train/simulate/test_effects.py` an
-effect, `tests/export/test_c_code.py` a quantity.
+`tests/edge/wire/chips/test_kinds.py` adds a chip,
+`tests/train/simulate/test_effects.py` an effect, `tests/export/test_c_code.py` a
+quantity.
 """
 
 import json
@@ -264,14 +265,20 @@ FACTORS = {"category": {"softness": [0, 0, 1, 1], "mobility": [0, 1, 0, 1]}}
 
 @pytest.mark.parametrize("engine", ENGINES)
 def test_a_scorer_is_a_module_nodes_and_an_entry(monkeypatch, tmp_path, engine):
-    """By itself softness would be soft; the nearest answer in which all agree is not."""
+    """By itself softness would be soft; the nearest answer in which all agree is
+    not."""
     module(edge.decide, monkeypatch, tmp_path, SCORER)
     monkeypatch.setitem(SCORERS, "toy", "edge.decide.toy.Means")
     tasks = {
         task: Task(labels, 0, 1, "none", 0.0, factors=FACTORS.get(task, {}))
         for task, labels in LABELS.items()
     }
-    blank = {"decision_points_s": (), "stopping": {}, "novelty": None, "usual": {}}
+    blank = {
+        "decision_points_s": (),
+        "stopping": {},
+        "outlier_score": None,
+        "usual": {},
+    }
     info = replace(Model(demo.MODEL).info, tasks=tasks, scorer="toy", **blank)
     path = tmp_path / "model.onnx"
     path.write_bytes(to_onnx(FittedMeans(MEANS), info))

@@ -13,7 +13,7 @@ from edge.record.labels import CATEGORY, Labels, LabelTable, Standing
 from edge.record.recording import Recording
 
 UNKNOWN = "unknown"
-"""The flag of a thing that was never met; in former recordings its label too."""
+"""The flag of an object that was never met; in former recordings its label too."""
 UNSURE = 0.8
 """Confidence below which a decision is unsure."""
 KINDS = ("unsure", "wrong", "unlabelled", "left_out")

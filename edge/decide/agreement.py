@@ -8,9 +8,9 @@ import numpy as np
 from edge.arrays import Array
 
 Factors = Mapping[str, Sequence[int]]
-"""{factor: the index of its label for each label of the product}. A product, such as
-category, has one label for each pair of its two factors' labels, such as mobility and
-softness, that was met in training."""
+"""{factor: the index of its label for each label of the joint task}. A joint task, such
+as category, has one label for each pair of its two factors' labels, such as mobility
+and softness, that was met in training."""
 
 
 def agreed(
@@ -18,13 +18,13 @@ def agreed(
     factors: Factors,
     distances: Mapping[str, Array],
 ) -> tuple[dict[str, Array], dict[str, Array]]:
-    """The nearest answer in which a product and its factors agree.
+    """The nearest answer in which a joint task and its factors agree.
 
     An answer's distance is the sum of its three labels' distances.
 
     Args:
-        task: the product.
-        factors: of the product.
+        task: the joint task.
+        factors: of the joint task.
         distances: {task: (..., labels) in log odds} of the three tasks at least.
 
     Returns:
@@ -47,8 +47,8 @@ def agreed(
     return labels, nearest
 
 
-def product_label(factors: Factors, indices: Mapping[str, int]) -> int | None:
-    """The index of the product's label for the factors' labels (indices); None where
+def joint_label(factors: Factors, indices: Mapping[str, int]) -> int | None:
+    """The index of the joint task's label for the factors' labels (indices); None where
     this pair is unseen."""
     pairs = list(zip(*factors.values(), strict=True))
     pair = tuple(indices[factor] for factor in factors)
@@ -66,7 +66,7 @@ def factors_fit(
     Args:
         factors: of the task.
         labels: {task: its labels} of a model.
-        task: the product.
+        task: the joint task.
     """
     lengths = {len(indices) for indices in factors.values()}
     if len(factors) != 2 or lengths != {len(labels[task])}:

@@ -50,9 +50,9 @@ def answers_about(
     except OutOfRange:
         answer = answer.flagged(out_of_range=True)
         return {task: replace(answer, task=task) for task in info.tasks}
-    if info.novelty is not None:
-        score = next(iter(decisions.values())).novelty
-        is_unusual = score > info.novelty.limits[point]
+    if info.outlier_score is not None:
+        score = next(iter(decisions.values())).outlier_score
+        is_unusual = score > info.outlier_score.limits[point]
         answer = answer.flagged(unusual=is_unusual)
         if is_unusual and window_s == info.window_s:
             phrase = unusual(vector, info.widths, info.usual)
@@ -113,8 +113,8 @@ def _answer(
         tie=decision.tie,
     )
     stopping = info.stopping.get(blank.task)
-    doubt = stopping and stopping.remoteness
-    if doubt and decision.remoteness > doubt.limits[point]:
+    doubt = stopping and stopping.known_distance
+    if doubt and decision.known_distance > doubt.limits[point]:
         return withheld(answer)
     return answer
 

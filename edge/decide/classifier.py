@@ -1,4 +1,5 @@
-"""The classifier: frames in, events out; shared by live reading, replay and the demo."""
+"""The classifier: frames in, events out; shared by live reading, replay and the
+demo."""
 
 from __future__ import annotations
 
@@ -40,7 +41,7 @@ class Pending:
         contact: that is followed.
         number: of the contact, from 1, if several are followed at once; else None.
         decision_point: index of the next of the model's decision points.
-        tasks: that wait; a product stands behind its factors.
+        tasks: that wait; a joint task stands behind its factors.
         decided: the answers so far, by task.
     """
 
@@ -75,7 +76,7 @@ class Classifier:
     certified for that rate: it is decided at the first decision point that is sure
     enough, and at the rule's last in any case (see `edge.decide.info`). A task for
     which no rule is certified is decided at the full window, flagged `uncertified`. A
-    task that is the product of two others, as category is of softness and mobility,
+    task that is the joint task of two others, as category is of softness and mobility,
     never contradicts them: it is decided when both are, by their labels, and they
     follow its rule where it has one that is as fast as theirs. An unusual contact waits
     for the full window. `unsure` flags that the window ended before the confidence was
@@ -113,8 +114,8 @@ class Classifier:
                 left out, flagged `missing_pose`.
 
         Raises:
-            InputError: the skin is not the one that the model was made for, the error rate
-                is outside (0, 1), or the model certifies it for no task.
+            InputError: the skin is not the one that the model was made for, the error
+                rate is outside (0, 1), or the model certifies it for no task.
         """
         self.model = model
         self._points_s = model.decision_points_s
@@ -202,7 +203,7 @@ class Classifier:
         self._numbers[contact] = number
         info = self.model.info
         first = self._last if self.error is None else 0
-        tasks = sorted(info.tasks, key=info.products.__contains__)
+        tasks = sorted(info.tasks, key=info.joint_tasks.__contains__)
         self._pending.append(Pending(contact, number, first, tasks))
         return Onset(contact.onset_s, number)
 

@@ -1,4 +1,5 @@
-"""Early decisions: policies that follow the stopping rules certified for an error rate."""
+"""Early decisions: policies that follow the stopping rules certified for an error
+rate."""
 
 from __future__ import annotations
 
@@ -7,7 +8,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
-from edge.decide.agreement import product_label
+from edge.decide.agreement import joint_label
 from edge.decide.answers import withheld
 from edge.decide.events import Decided
 from edge.decide.info import ModelInfo, Stopping, StoppingRule, margin
@@ -34,7 +35,7 @@ def policies(model: Model, error: float) -> Mapping[str, Policy]:
         if rule is None:
             policy_of[task] = Uncertified(model.info)
         else:
-            kind = JointDecision if task in model.info.products else Early
+            kind = JointDecision if task in model.info.joint_tasks else Early
             policy_of[task] = kind(model.info, task, rule, error)
     return policy_of
 
@@ -122,12 +123,12 @@ class Early:
 
     def _is_sure(self, candidate: Decided, point: int) -> bool:
         decision = _decision(candidate)
-        novelty = self._info.novelty
+        outlier_score = self._info.outlier_score
         # A model with decision points has both.
-        assert novelty is not None
+        assert outlier_score is not None
         assert decision.label_distances is not None
         label = self._task.labels.index(decision.label)
-        excess = novelty.excess(point, decision.novelty)
+        excess = outlier_score.excess(point, decision.outlier_score)
         distances = decision.label_distances.tolist()
         return is_sure(self._stopping, self._rule, distances, label, excess)
 
@@ -160,7 +161,7 @@ class JointDecision(Early):
 def paired(
     info: ModelInfo, candidate: Decided, decided: Mapping[str, Decided]
 ) -> Decided:
-    """The answer to a product by its factors' labels. An unseen pair has no
+    """The answer to a joint task by its factors' labels. An unseen pair has no
     name, nor has one with an unknown factor."""
     task = info.tasks[candidate.task]
     indices = {}
@@ -170,7 +171,7 @@ def paired(
         labels = info.tasks[factor].labels
         indices[factor] = labels.index(answer.label) if answer.label in labels else -1
         likely *= answer.confidence or 0.0
-    index = product_label(task.factors, indices)
+    index = joint_label(task.factors, indices)
     if index is None or candidate.label is None:
         return withheld(candidate)
     label = task.labels[index]

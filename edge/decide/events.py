@@ -42,7 +42,7 @@ class Decided:
 
     Attributes:
         task: the question.
-        label: its answer; None if the thing is unknown, or the features are too large
+        label: its answer; None if the object is unknown, or the features are too large
             to be compared with the training rows.
         confidence: the calibrated probability that the label is right, 0 to 1; None
             of a model without calibration.

@@ -1,4 +1,5 @@
-"""The flags of a decision: the reasons to doubt it, in the order in which they stand."""
+"""The flags of a decision: the reasons to doubt it, in the order in which they
+stand."""
 
 FLAGS = {
     "no_contact": (
@@ -49,8 +50,8 @@ FLAGS = {
         "for the full window"
     ),
     "unknown": (
-        "the thing is far from all that training met: `label` is null, and the answers "
-        "of other tasks stand. Only the task that names things, which has the most "
+        "the object is far from all that training met: `label` is null, and the answers "
+        "of other tasks stand. Only the task that names objects, which has the most "
         "labels but for kinds such as category, has this flag"
     ),
     "tie": "another label had the same number of votes",

@@ -1,6 +1,6 @@
-"""What a model's file says beside its graph: its tasks, its features, and its calibration:
-how sure a decision is, when it may come early, and which contacts are unusual or of
-unseen things."""
+"""What a model's file says beside its graph: its tasks, its features, and its
+calibration: how sure a decision is, when it may come early, and which contacts are
+unusual or of unseen objects."""
 
 from __future__ import annotations
 
@@ -63,10 +63,11 @@ class Task:
 
 
 @dataclass(frozen=True)
-class Novelty:
-    """When a contact is unusual: unlike all in training, whatever the thing.
+class OutlierLimits:
+    """When a contact is unusual: unlike all in training, whatever the object.
 
-    The outlier score of a contact is of a space of its own (`train.model.novelty`).
+    The outlier score of a contact is of a space of its own
+    (`train.model.outlier_score`).
 
     Attributes:
         typical: (decision points,) scores that half of trained contacts exceed.
@@ -83,14 +84,15 @@ class Novelty:
 
 
 @dataclass(frozen=True)
-class Remoteness:
-    """When a thing is unknown: far from the known objects by what tells things apart.
+class KnownDistance:
+    """When an object is unknown: far from the known objects by what tells objects
+    apart.
 
     Attributes:
-        limits: (decision points,) scores that few things in training exceed.
-        middles: (decision points,) scores at which a thing is as likely known as not.
+        limits: (decision points,) scores that few objects in training exceed.
+        middles: (decision points,) scores at which an object is as likely known as not.
         slopes: (decision points,) by which the odds fall with the score's logarithm.
-        worth: shares of unseen things, see `train.model.never_met`; empty
+        worth: shares of unseen objects, see `train.model.never_met`; empty
             where none could be.
     """
 
@@ -100,7 +102,7 @@ class Remoteness:
     worth: Mapping[str, float] = field(default_factory=dict)
 
     def known(self, decision_point: int, score: float) -> float:
-        """Probability, 0 to 1, that the thing is one of those in training."""
+        """Probability, 0 to 1, that the object is one of those in training."""
         if score <= 0.0:
             return 1.0
         log_odds = log(self.middles[decision_point] / score)
@@ -148,19 +150,21 @@ class StoppingRule:
 
 @dataclass(frozen=True)
 class Stopping:
-    """The calibration of one task's early decisions, which `train.model.stopping` makes.
+    """The calibration of one task's early decisions, which `train.model.stopping`
+    makes.
 
     Attributes:
         slopes, intercepts, doubts: of each decision point: the probability that the
             label is right is the logistic function of slope * `margin` + intercept -
-            doubt * `Novelty.excess`.
+            doubt * `OutlierLimits.excess`.
         slope, intercept, doubt: the same of all decision points together, for the
             rules.
         rules: in the order of rising error. Mean times never rise along them.
         trials: number of trials that certify the rules.
         wrong: number of these trials that are decided wrongly at the full window.
         risk: probability that a rule errs more often than its certificate says.
-        remoteness: of the task that names things, and none that is unknown; else None.
+        known_distance: of the task that names objects, and none that is unknown; else
+            None.
     """
 
     slopes: tuple[float, ...] = field(metadata=SLOPE)
@@ -173,7 +177,7 @@ class Stopping:
     trials: int = field(metadata={"allowed": range(1, 1 << 31)})
     wrong: int
     risk: float = field(metadata=RISK)
-    remoteness: Remoteness | None = None
+    known_distance: KnownDistance | None = None
 
     def confidence(
         self,
@@ -181,7 +185,7 @@ class Stopping:
         distances: Sequence[float],
         label: int,
         excess: float,
-        remoteness: float = 0.0,
+        known_distance: float = 0.0,
     ) -> float:
         """Probability, 0 to 1, that a label is right.
 
@@ -189,15 +193,15 @@ class Stopping:
             decision_point: its index.
             distances: (labels,) of `edge.decide.Decision.label_distances`.
             label: its index.
-            excess: the contact's `Novelty.excess`.
-            remoteness: of the contact.
+            excess: the contact's `OutlierLimits.excess`.
+            known_distance: of the contact.
         """
         log_odds = self.slopes[decision_point] * margin(distances, label)
         log_odds += self.intercepts[decision_point]
         likely = logistic(log_odds - self.doubts[decision_point] * excess)
-        if self.remoteness is None:
+        if self.known_distance is None:
             return likely
-        return likely * self.remoteness.known(decision_point, remoteness)
+        return likely * self.known_distance.known(decision_point, known_distance)
 
 
 @dataclass(frozen=True)
@@ -224,8 +228,8 @@ class ModelInfo:
     calibration."""
     stopping: dict[str, Stopping] = field(default_factory=dict)
     """The stopping rules of each task; empty without decision points."""
-    novelty: Novelty | None = None
-    """The limits of novelty; None without decision points."""
+    outlier_score: OutlierLimits | None = None
+    """The limits of the outlier score; None without decision points."""
     joints: int = limited(0, allowed=range(1001))
     """Number of joint angles in a frame, if a feature is made of them; else 0."""
     kernels: Mapping[str, KernelTable] = field(default_factory=dict)
@@ -242,10 +246,11 @@ class ModelInfo:
     """(dof,) seconds for which each joint stood still in nearly all training trials, at
     the longest."""
     repeats: bool = False
-    """Whether frames of many training touches repeat bit for bit, as of switches or coarse
-    sensors, so that this is no doubt."""
+    """Whether frames of many training touches repeat bit for bit, as of switches or
+    coarse sensors, so that this is no doubt."""
     onset: str = ""
-    """What tells the onsets other than the skin, see `edge.touch.frame.ONSETS`; empty where
+    """What tells the onsets other than the skin, see `edge.touch.frame.ONSETS`; empty
+    where
     the skin does."""
     scorer: str = "knn"
     """What gives the distances of labels, one of `edge.decide.engines.SCORERS`."""
@@ -283,7 +288,7 @@ class ModelInfo:
         )
 
     @property
-    def products(self) -> dict[str, Mapping[str, Sequence[int]]]:
+    def joint_tasks(self) -> dict[str, Mapping[str, Sequence[int]]]:
         """{task: its factors} of tasks that are decided together with two others."""
         return {name: task.factors for name, task in self.tasks.items() if task.factors}
 
@@ -295,14 +300,14 @@ class ModelInfo:
     @property
     def has_label_distances(self) -> bool:
         """Whether the model gives the distances of the labels."""
-        return bool(self.decision_points_s or self.products)
+        return bool(self.decision_points_s or self.joint_tasks)
 
     @property
     def outputs(self) -> dict[str, tuple[str, tuple[int, ...]]]:
         """{output of the model: its type, and its shape for one vector}."""
         scores = ["out_of_range"]
         if self.decision_points_s:
-            scores += ["novelty", "remoteness"]
+            scores += ["outlier_score", "known_distance"]
         outputs: dict[str, tuple[str, tuple[int, ...]]] = dict.fromkeys(
             scores, ("float64", ())
         )

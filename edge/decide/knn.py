@@ -65,7 +65,8 @@ class Constants:
 
 
 def clipped(x: Floats, limit: Array) -> tuple[Floats, Floats]:
-    """Numbers (n, m) cut off at plus and minus a limit, and their summed excess (n,)."""
+    """Numbers (n, m) cut off at plus and minus a limit, and their summed excess
+    (n,)."""
     inside = x.clip(-limit, limit)
     return inside, np.asarray(np.abs(x - inside).sum(axis=1))
 
@@ -146,28 +147,29 @@ def _mean_root(squares: Floats, count: int) -> Floats:
 
 
 def doubts(at: Constants, features: Floats) -> dict[str, Array]:
-    """(n,) novelty and remoteness of features (n, width); see `train.model.novelty`."""
-    centred = features - at.numbers("novelty means", 1)
-    scaled = np.rint(centred * at.numbers("novelty gains", 1))
-    steps, _ = clipped(scaled, at.numbers("novelty most steps"))
-    inner = steps @ at.numbers("novelty weights", 2)
-    inner = np.rint(inner * at.numbers("novelty factor"))
+    """(n,) the outlier score and the distance to known objects of features (n, width);
+    see `train.model.outlier_score`."""
+    centred = features - at.numbers("outlier means", 1)
+    scaled = np.rint(centred * at.numbers("outlier gains", 1))
+    steps, _ = clipped(scaled, at.numbers("outlier most steps"))
+    inner = steps @ at.numbers("outlier weights", 2)
+    inner = np.rint(inner * at.numbers("outlier factor"))
     outside = np.maximum((steps**2).sum(axis=1) - (inner**2).sum(axis=1), 1.0)
-    white = inner @ at.numbers("novelty whitening", 2)
-    white = np.rint(white * at.numbers("novelty whitening factors"))
-    y, _ = clipped(white, at.numbers("novelty limit"))
-    weights = at.numbers("remoteness weights", 1)
+    white = inner @ at.numbers("outlier whitening", 2)
+    white = np.rint(white * at.numbers("outlier whitening factors"))
+    y, _ = clipped(white, at.numbers("outlier limit"))
+    weights = at.numbers("known weights", 1)
     weighted = y * weights
     spread = np.sqrt(outside)
     return {
-        "novelty": spread * _least_root(at, "novelty", y, y),
-        "remoteness": _least_root(at, "remoteness", weighted, weighted * weights),
+        "outlier_score": spread * _least_root(at, "outlier", y, y),
+        "known_distance": _least_root(at, "known", weighted, weighted * weights),
     }
 
 
 def _least_root(at: Constants, kind: str, y: Floats, factor: Floats) -> Floats:
     """(n,) root of the smallest of the squared distances times the nearness."""
-    rows = at.numbers("novelty coordinates", 2)
+    rows = at.numbers("outlier coordinates", 2)
     squares = squared_distances(y, factor, rows, at.numbers(f"{kind} lengths", 1))
     nearness = at.numbers(f"{kind} nearness", 1)
     return np.asarray(np.sqrt((squares * nearness).min(axis=1)))

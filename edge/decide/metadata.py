@@ -7,7 +7,7 @@ from edge.decide.info import FORMAT, ModelInfo
 OPTIONAL = (
     "decision_points_s",
     "stopping",
-    "novelty",
+    "outlier_score",
     "joints",
     "kernels",
     "name",
@@ -21,7 +21,8 @@ OPTIONAL = (
 
 
 def to_json(info: ModelInfo) -> str:
-    """The metadata as JSON text, which `edge.decide.metadata_reader.from_json` reads."""
+    """The metadata as JSON text, which `edge.decide.metadata_reader.from_json`
+    reads."""
     entries = vars(info) | {
         "format": FORMAT,
         "skin": info.layout.to_dict(),

@@ -9,9 +9,9 @@ from edge.config import ConfigTable, parse_json, short_text
 from edge.decide.agreement import factors_fit
 from edge.decide.info import (
     FORMAT,
+    KnownDistance,
     ModelInfo,
-    Novelty,
-    Remoteness,
+    OutlierLimits,
     Stopping,
     StoppingRule,
     Task,
@@ -63,12 +63,14 @@ def _read(meta: ConfigTable) -> ModelInfo:
     if arm is not None:
         chain = Chain.from_dict(arm, where=f"{meta.where}: arm")
     stopping = {}
-    novelty = None
+    outlier_score = None
     count = len(meta.numbers("decision_points_s", default=()))
     if count:
         rules = meta.table("stopping")
         stopping = {task: read_stopping(rules.table(task), count) for task in rules.raw}
-        novelty = Novelty(**meta.table("novelty").values(Novelty, count))
+        outlier_score = OutlierLimits(
+            **meta.table("outlier_score").values(OutlierLimits, count)
+        )
     kernels = {}
     if not KERNELS.keys().isdisjoint(names):
         kernels = read_tables(meta.table("kernels"), names, layout)
@@ -81,7 +83,7 @@ def _read(meta: ConfigTable) -> ModelInfo:
         "chain": chain,
         "versions": {str(key): str(version) for key, version in versions.items()},
         "stopping": stopping,
-        "novelty": novelty,
+        "outlier_score": outlier_score,
         "kernels": kernels,
         "usual": _usual(meta, names),
         "onset": meta.choice("onset", ("", *ONSETS), ""),
@@ -116,14 +118,16 @@ def read_stopping(table: ConfigTable, points: int) -> Stopping:
     others: dict[str, Any] = {
         "rules": tuple(rules),
         "wrong": table.whole("wrong", allowed=range(trials + 1)),
-        "remoteness": None,
+        "known_distance": None,
     }
-    if table.has("remoteness"):
-        others["remoteness"] = read_remoteness(table.table("remoteness"), points)
+    if table.has("known_distance"):
+        others["known_distance"] = read_known_distance(
+            table.table("known_distance"), points
+        )
     return Stopping(**table.values(Stopping, points, **others))
 
 
-def read_remoteness(table: ConfigTable, points: int) -> Remoteness:
+def read_known_distance(table: ConfigTable, points: int) -> KnownDistance:
     """The doubt about names, of a model with this number of decision points.
 
     Raises:
@@ -131,7 +135,7 @@ def read_remoteness(table: ConfigTable, points: int) -> Remoteness:
     """
     shares = table.table("worth")
     worth = {name: shares.number(name, low=0.0, high=1.0) for name in shares.raw}
-    return Remoteness(**table.values(Remoteness, points, worth=worth))
+    return KnownDistance(**table.values(KnownDistance, points, worth=worth))
 
 
 def _usual(meta: ConfigTable, names: Sequence[str]) -> dict[str, Sequence[float]]:
@@ -189,9 +193,9 @@ def _contradictions_of_tasks(info: ModelInfo) -> Iterator[str]:
         if task.features != tuple(f for f in info.features if f in task.features):
             yield f"task {name!r} takes other features, or in another order"
     labels = {name: task.labels for name, task in info.tasks.items()}
-    for name, factors in info.products.items():
+    for name, factors in info.joint_tasks.items():
         if not factors_fit(factors, labels, name):
-            yield f"task {name!r} is not the product of its factors"
+            yield f"task {name!r} is not the joint task of its factors"
 
 
 def _points_fit(info: ModelInfo) -> bool:

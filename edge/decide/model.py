@@ -51,8 +51,8 @@ class Decision(NamedTuple):
             agree.
         out_of_range: the features lie so far outside those of the training trials that
             the model cut them off; see `train.model.projection.Grid`.
-        novelty, remoteness: the outlier score, and the distance to the known objects
-            (see `edge.decide.info`), of a model with decision points.
+        outlier_score, known_distance: the outlier score, and the distance to the known
+            objects (see `edge.decide.info`), of a model with decision points.
     """
 
     label: str
@@ -64,8 +64,8 @@ class Decision(NamedTuple):
     tie: bool
     label_distances: Floats | None = None
     out_of_range: bool = False
-    novelty: float = 0.0
-    remoteness: float = 0.0
+    outlier_score: float = 0.0
+    known_distance: float = 0.0
 
 
 class Model:
@@ -211,9 +211,9 @@ class Model:
             distances[task] = answers.get(f"{task}_label_distances")
         if min(labels.values()) < 0:
             raise self._refusal(x)
-        for product, factors in self.info.products.items():
+        for joint, factors in self.info.joint_tasks.items():
             # The nearest answer in which the three tasks agree.
-            agreed_labels, agreed_distances = agreed(product, factors, distances)
+            agreed_labels, agreed_distances = agreed(joint, factors, distances)
             labels |= agreed_labels
             distances |= agreed_distances
         point = -1 if decision_point is None else decision_point
@@ -246,16 +246,16 @@ class Model:
         shares = scores.tolist()
         if label >= len(shares) or not 0.0 <= shares[label] <= 1.0:
             raise self._broken(f"{task} is answered by label {label} of {len(shares)}")
-        novelty = float(answers.get("novelty", 0.0))
-        remoteness = float(answers.get("remoteness", 0.0))
+        outlier_score = float(answers.get("outlier_score", 0.0))
+        known_distance = float(answers.get("known_distance", 0.0))
         confidence = None
-        if self.info.novelty is not None:
+        if self.info.outlier_score is not None:
             confidence = self.info.stopping[task].confidence(
                 point,
                 distances.tolist(),
                 label,
-                self.info.novelty.excess(point, novelty),
-                remoteness,
+                self.info.outlier_score.excess(point, outlier_score),
+                known_distance,
             )
         return Decision(
             label=self.info.tasks[task].labels[label],
@@ -267,8 +267,8 @@ class Model:
             tie=shares.count(max(shares)) > 1,
             label_distances=distances,
             out_of_range=bool(answers["out_of_range"] > 0.0),
-            novelty=novelty,
-            remoteness=remoteness,
+            outlier_score=outlier_score,
+            known_distance=known_distance,
         )
 
     def _broken(self, reason: str) -> InputError:

@@ -1,4 +1,5 @@
-"""Decisions on recordings, compared with their labels and with those of another model."""
+"""Decisions on recordings, compared with their labels and with those of another
+model."""
 
 from __future__ import annotations
 
@@ -24,7 +25,9 @@ UNMEASURED = (
     "How it answers for an unseen {} is not known: too few were in training for one to "
     "be held out."
 )
-UNDOUBTED = "It names every touch without a doubt, also those of things it has not met."
+UNDOUBTED = (
+    "It names every touch without a doubt, also those of objects it has not met."
+)
 
 
 def doubt(stopping: Mapping[str, Stopping]) -> Iterator[str]:
@@ -32,8 +35,8 @@ def doubt(stopping: Mapping[str, Stopping]) -> Iterator[str]:
     if not stopping:
         yield UNDOUBTED
     for task, of_task in stopping.items():
-        if of_task.remoteness is not None:
-            worth = of_task.remoteness.worth
+        if of_task.known_distance is not None:
+            worth = of_task.known_distance.worth
             sentence = MEASURED if worth else UNMEASURED
             yield sentence.format(task, **worth)
 

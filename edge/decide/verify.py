@@ -12,7 +12,7 @@ by.
 | `vectors` | float64 (v, width) | feature vectors; the first m are the trials', in order |
 | `<task>_label`, `_scores`, `_distances`, `_neighbours` | | the graph's outputs for `vectors` |
 | `<task>_label_distances` | float64 (v, labels) | likewise, where the model gives them |
-| `novelty`, `remoteness` | float64 (v,) | likewise |
+| `outlier_score`, `known_distance` | float64 (v,) | likewise |
 | `out_of_range` | float64 (v,) | the graph's output |
 | `decision_point_vectors` | float64 (points, w, width) | vectors for each decision point |
 | `decision_point_<task>_label`, ... | | the graph's outputs for these, each at its point |

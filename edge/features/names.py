@@ -2,11 +2,11 @@
 
 A feature's name is a zone and a quantity (`edge.features.quantities`), such as
 `skin_force` or `left_width`, or that of a quantity alone. Transforms stand before the
-name (`log_`, `sqrt_`, `relative_`; the one next to the name is applied first). A summary
-of its course stands after it (`_rate`, `_mean`, `_deviation`, `_roughness`):
-`sqrt_left_force`, `relative_skin_force_rate`, `sqrt_taxel_force_mean`. `@10` at the end
-takes the feature at ten times of the window, whatever the model's number of samples.
-Only zones that some feature needs are measured.
+name (`log_`, `sqrt_`, `relative_`; the one next to the name is applied first). A
+summary of its time series stands after it (`_rate`, `_mean`, `_deviation`,
+`_roughness`): `sqrt_left_force`, `relative_skin_force_rate`, `sqrt_taxel_force_mean`.
+`@10` at the end takes the feature at ten times of the window, whatever the model's
+number of samples. Only zones that some feature needs are measured.
 """
 
 import difflib
@@ -29,9 +29,9 @@ TRANSFORMS = ("log", "sqrt", "relative")
 `edge.features.vector`), the square root with the value's sign, and the value over its
 largest magnitude within the window."""
 SUMMARIES = ("rate", "mean", "deviation", "roughness")
-"""Summaries of a feature's course. The rate is a course itself, of the change a second.
-The others are one number for the window: mean, standard deviation, mean step from
-sample to sample."""
+"""Summaries of a feature's time series. The rate is a time series itself, of the change
+a second. The others are one number for the window: mean, standard deviation, mean step
+from sample to sample."""
 _NAME = re.compile(
     rf"((?:(?:{'|'.join(TRANSFORMS)})_)*)(.+?)(?:_({'|'.join(SUMMARIES)}))?(?:@(\d+))?"
 )
@@ -47,7 +47,7 @@ class Feature:
         zone: one of `ZONES`, or `arm`.
         quantity: that is measured.
         transforms: of its value, in the order in which they are applied.
-        summary: one of `SUMMARIES`, or empty for its course.
+        summary: one of `SUMMARIES`, or empty for its time series.
         samples: times at which it is taken; 0 for the model's number.
     """
 

@@ -32,7 +32,7 @@ def widths(
 ) -> tuple[int, ...]:
     """How many values of a vector each feature takes, in their order.
 
-    A course takes `samples` values, or as many as its name says, for each cell or
+    A time series takes `samples` values, or as many as its name says, for each cell or
     joint. A feature that is one number for the window takes 1 for each.
 
     Args:
@@ -75,8 +75,8 @@ def feature_vector(
     >>> edge.feature_vector(series, window_s=1.2).shape
     (120,)
 
-    A course is sampled at `samples` times, or as many as its name says, uniform in the
-    window. Cells and joints follow one after another; see `widths`. Samples are
+    A time series is sampled at `samples` times, or as many as its name says, uniform in
+    the window. Cells and joints follow one after another; see `widths`. Samples are
     interpolated linearly between frames, so jitter and dropped frames do not shift
     them. A value that is not known in some frames is interpolated between those that
     know it, held after the last of them, and 0 where no frame knows it. Such values are
@@ -118,11 +118,11 @@ def feature_vector(
     if series.t.size == 0:
         raise InputError("the contact has no frame")
     zones = cache(partial(ZoneSeries, series))
-    course = _Course(series, window_s, tables or {}, zones)
+    time_series = _TimeSeries(series, window_s, tables or {}, zones)
     # The model refuses a value that is too large for a float.
     with np.errstate(all="ignore"):
         groups = [tuple(group) for _, group in groupby(types, key=_kind)]
-        return np.concatenate([course.block(group, samples) for group in groups])
+        return np.concatenate([time_series.block(group, samples) for group in groups])
 
 
 def _kind(feature: Feature) -> tuple[str, int, tuple[str, ...], str]:
@@ -132,7 +132,7 @@ def _kind(feature: Feature) -> tuple[str, int, tuple[str, ...], str]:
 
 
 @dataclass
-class _Course:
+class _TimeSeries:
     """The measurements of a contact, sampled at times of its window."""
 
     series: FeatureSeries

@@ -1,5 +1,6 @@
-"""Labels of trials: the table beside the recordings, labels of a file made printable, and
-tasks whose labels are made of two others' labels, as a category is softness by mobility.
+"""Labels of trials: the table beside the recordings, labels of a file made printable,
+and tasks whose labels are made of two others' labels, as a category is softness by
+mobility.
 """
 
 import csv
@@ -34,20 +35,20 @@ def plain(labels: Labels, path: str) -> dict[str, str]:
 
 
 @dataclass(frozen=True)
-class Product:
+class JointTask:
     """A task whose labels are those of its two factors, joined by a hyphen.
 
     Attributes:
-        task: the product, such as category.
-        factors: the two tasks, in the order of their labels in the product's.
+        task: the joint task, such as category.
+        factors: the two tasks, in the order of their labels in the joint task's.
     """
 
     task: str
     factors: tuple[str, str]
 
     def label(self, labels: Labels) -> str | None:
-        """The product's label that follows from a trial's labels of both factors; None
-        where it lacks one.
+        """The joint task's label that follows from a trial's labels of both factors;
+        None where it lacks one.
 
         >>> CATEGORY.label({"softness": "soft", "mobility": "fixed"})
         'soft-fixed'
@@ -57,8 +58,8 @@ class Product:
         return "-".join(labels[factor] for factor in self.factors)
 
     def completed(self, labels: Labels) -> dict[str, str]:
-        """A trial's labels, with those of the product or of its factors that follow from
-        the others.
+        """A trial's labels, with those of the joint task or of its factors that follow
+        from the others.
 
         >>> CATEGORY.completed({"category": "soft-fixed"})
         {'softness': 'soft', 'mobility': 'fixed', 'category': 'soft-fixed'}
@@ -73,7 +74,8 @@ class Product:
         return {**implied, **labels}
 
     def contradiction(self, labels: Labels) -> str:
-        """A sentence on a trial whose label of the product is another than that of its
+        """A sentence on a trial whose label of the joint task is another than that of
+        its
         factors; empty elsewhere."""
         implied = self.label(self.completed(labels))
         label = labels.get(self.task, implied)
@@ -85,7 +87,7 @@ class Product:
         )
 
 
-CATEGORY = Product("category", ("softness", "mobility"))
+CATEGORY = JointTask("category", ("softness", "mobility"))
 """The paper's categories."""
 
 

@@ -28,8 +28,8 @@ Labels = Sequence[Mapping[str, str]]
 
 
 def slips(labels: Labels, places: Sequence[str]) -> list[str]:
-    """A sentence for each label that is probably a slip or contradicts others, with some
-    of the places (n,) of its recordings.
+    """A sentence for each label that is probably a slip or contradicts others, with
+    some of the places (n,) of its recordings.
 
     >>> slips([{"object": "box"}] * 8 + [{"object": "Box"}], list("abcdefghi"))
     ["object='Box': is it 'box'? (1 of 9 recordings: i)"]
@@ -79,7 +79,7 @@ def _doubtful(labels: Labels, singles: bool) -> dict[tuple[str, str], str]:
 
 
 def too_few(labels: Labels) -> list[str]:
-    """A sentence where the recordings are of two things, so that none can be unknown.
+    """A sentence where the recordings are of two objects, so that none can be unknown.
 
     >>> too_few([{"object": "box"}, {"object": "cup"}])
     ['record a third object, and the model can tell what it does not know']

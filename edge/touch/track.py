@@ -45,11 +45,11 @@ class ContactTracker:
     A contact begins with the first of `debounce` frames in a row whose region has a
     peak above the skin's onset count. It ends when no taxel of it has been above the
     threshold for the skin's `release_s`. With two thresholds, a force that hovers at
-    one of them stays one contact. With the time, an arm that bounces off a rigid thing
+    one of them stays one contact. With the time, an arm that bounces off a rigid object
     and comes back makes one contact.
 
-    With `outside`, the one contact begins with each frame that is an onset, whatever the skin
-    feels, and lasts for the horizon at least.
+    With `outside`, the one contact begins with each frame that is an onset, whatever
+    the skin feels, and lasts for the horizon at least.
 
     Attributes:
         layout: the skin, with its thresholds.

@@ -48,16 +48,16 @@ static double margin(uint32_t index) {
 }
 
 static double excess(void) {
-  if (!EC_HAS_NOVELTY) return 0.0;
+  if (!EC_HAS_OUTLIERS) return 0.0;
   double typical = ec_model_now.doubts[question.point].typical;
-  double score = ec_scores_now.novelty;
+  double score = ec_scores_now.outlier_score;
   return score > typical && typical > 0.0 ? ec_log(score / typical) : 0.0;
 }
 
-/* Probability that the thing is one of those in training. */
+/* Probability that the object is one of those in training. */
 static double known(void) {
   const ec_doubt *doubt = &ec_model_now.doubts[question.point];
-  double score = ec_scores_now.remoteness;
+  double score = ec_scores_now.known_distance;
   if (score <= 0.0) return 1.0;
   return ec_logistic(doubt->slope * ec_log(doubt->middle / score));
 }
@@ -68,14 +68,14 @@ static double confidence(const double curve[3], uint32_t index) {
   return ec_logistic(log_odds - curve[2] * excess());
 }
 
-/* Of a product's label, that of a factor. */
+/* Of a joint task's label, that of a factor. */
 static uint16_t index_of(const ec_task *task, uint32_t factor, uint32_t label) {
   return ec_model_now.words[task->indices[factor] + label];
 }
 
-static bool is_product(const ec_task *task) { return task->indices[0] != EC_NOWHERE; }
+static bool is_joint(const ec_task *task) { return task->indices[0] != EC_NOWHERE; }
 
-/* The nearest answer in which a product and its factors agree. */
+/* The nearest answer in which a joint task and its factors agree. */
 static void agree(uint32_t index) {
   const ec_task *task = &ec_tasks[index];
   double *total = distances[index];
@@ -134,9 +134,9 @@ static void ask(uint32_t index, bool refused) {
   double likely = confidence(ec_model_now.places[question.point * EC_TASKS + index].curve, index);
   if (index == EC_NAMING) likely *= known();
   a->confidence = rounded(likely);
-  if (!EC_HAS_NOVELTY) return;
-  a->flags |= flag(ec_scores_now.novelty > doubt->novel, EC_UNUSUAL);
-  if (index == EC_NAMING && ec_scores_now.remoteness > doubt->remote) withhold(a);
+  if (!EC_HAS_OUTLIERS) return;
+  a->flags |= flag(ec_scores_now.outlier_score > doubt->outlying, EC_UNUSUAL);
+  if (index == EC_NAMING && ec_scores_now.known_distance > doubt->far) withhold(a);
 }
 
 /* The model's answers at the decision point to the tasks that wait; whether it refuses. */
@@ -149,7 +149,7 @@ static bool ask_all(void) {
     for (uint32_t j = 0; j < task->labels; j++) distances[i][j] = ec_answers[i].label_distances[j];
   }
   for (uint32_t i = 0; i < EC_TASKS && !refused; i++) {
-    if (is_product(&ec_tasks[i])) agree(i);
+    if (is_joint(&ec_tasks[i])) agree(i);
   }
   for (uint32_t i = 0; i < EC_TASKS; i++) {
     if (!decided[i]) ask(i, refused);
@@ -165,8 +165,8 @@ static bool stop(ec_event *a, const ec_task *task, bool sure) {
   return true;
 }
 
-/* A product is decided when both factors are, by their labels. */
-static bool stop_product(const ec_task *task, ec_event *a) {
+/* A joint task is decided when both factors are, by their labels. */
+static bool stop_joint(const ec_task *task, ec_event *a) {
   const ec_event *f[2] = {&answers[task->factors[0]], &answers[task->factors[1]]};
   if (!decided[task->factors[0]] || !decided[task->factors[1]]) return false;
   bool sure = f[0]->stopped_by == EC_CONFIDENCE && f[1]->stopped_by == EC_CONFIDENCE;
@@ -193,7 +193,7 @@ static bool is_decided(uint32_t index) {
     a->flags |= EC_UNCERTIFIED;
     return question.point == EC_POINTS - 1;
   }
-  if (is_product(task)) return stop_product(task, a);
+  if (is_joint(task)) return stop_joint(task, a);
   bool waits = a->flags & EC_UNUSUAL;
   bool sure = confidence(task->rule_curve, index) >= task->rule_confidence;
   uint32_t last = waits ? EC_POINTS - 1 : task->rule_last;
@@ -201,13 +201,13 @@ static bool is_decided(uint32_t index) {
   return stop(a, task, sure);
 }
 
-/* Ask at the decision point; the number of events. Factors come before their products. */
+/* Ask at the decision point; the number of events. Factors come before their joint tasks. */
 static int decide(ec_event *events) {
   int count = 0;
   bool refused = ask_all();
   for (int turn = 0; turn < 2; turn++) {
     for (uint32_t i = 0; i < EC_TASKS; i++) {
-      if (decided[i] || is_product(&ec_tasks[i]) != turn) continue;
+      if (decided[i] || is_joint(&ec_tasks[i]) != turn) continue;
       if (!refused && !is_decided(i)) continue;
       events[count++] = answers[i];
       decided[i] = true;

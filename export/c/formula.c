@@ -132,7 +132,7 @@ static bool doubt(const ec_doubt *d) {
     squares -= (uint64_t)((int64_t)z[i] * z[i]);
   }
   double outside = (double)(int64_t)squares;
-  ec_scores_now.novelty = ec_sqrt(outside > 1.0 ? outside : 1.0);
+  ec_scores_now.outlier_score = ec_sqrt(outside > 1.0 ? outside : 1.0);
   begin_product(d->whitening);
   for (uint32_t i = 0; i < p->components; i++) multiply(z[i], p->components);
   for (uint32_t i = 0; i < p->components; i++) {
@@ -186,8 +186,8 @@ static bool doubt_of_trials(const ec_doubt *d) {
     if (farther < nearest_weighted) nearest_weighted = farther;
   }
   if (!is_last) return false;
-  ec_scores_now.novelty *= ec_sqrt(nearest_squares);
-  ec_scores_now.remoteness = ec_sqrt(nearest_weighted);
+  ec_scores_now.outlier_score *= ec_sqrt(nearest_squares);
+  ec_scores_now.known_distance = ec_sqrt(nearest_weighted);
   return true;
 }
 
@@ -280,9 +280,9 @@ static bool compute(uint32_t point) {
     return space(&ec_model_now.projections[point * EC_SPACES + part], &spaces[part]);
   }
   part -= EC_SPACES;
-  if (part == 0 && EC_HAS_NOVELTY) return doubt(d);
-  if (part == 1 && EC_HAS_NOVELTY) return doubt_of_trials(d);
-  part -= EC_HAS_NOVELTY ? 2 : 0;
+  if (part == 0 && EC_HAS_OUTLIERS) return doubt(d);
+  if (part == 1 && EC_HAS_OUTLIERS) return doubt_of_trials(d);
+  part -= EC_HAS_OUTLIERS ? 2 : 0;
   const ec_place *place = &ec_model_now.places[point * EC_TASKS + part];
   return task_of_trials(&ec_tasks[part], place, &ec_answers[part]);
 }
@@ -292,7 +292,7 @@ bool ec_formula_slice(uint32_t point) {
   bool is_done = compute(point);
   now.begin = is_done ? 0 : now.end;
   now.part += is_done;
-  if (now.part < EC_SPACES + (EC_HAS_NOVELTY ? 2 : 0) + EC_TASKS) return false;
+  if (now.part < EC_SPACES + (EC_HAS_OUTLIERS ? 2 : 0) + EC_TASKS) return false;
   ec_scores_now.out_of_range = false;
   for (uint32_t i = 0; i < EC_SPACES; i++) {
     if (!(spaces[i].excess <= 0.0)) ec_scores_now.out_of_range = true;

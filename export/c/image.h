@@ -30,7 +30,7 @@ typedef struct {
   uint32_t debounce;
   uint32_t repeats;
   uint32_t early;
-  uint32_t naming; /* the task that names things; EC_NOWHERE: none is unknown */
+  uint32_t naming; /* the task that names objects; EC_NOWHERE: none is unknown */
   uint32_t text; /* the name of the model */
   uint32_t calibrated; /* whether answers have a confidence */
   uint32_t unused;
@@ -62,7 +62,7 @@ typedef struct {
   uint32_t force_motion;
   uint32_t centroids;
   uint32_t spreads;
-  uint32_t has_novelty;
+  uint32_t has_outliers;
 } ec_sizes;
 
 typedef struct {
@@ -136,8 +136,8 @@ typedef struct {
   double factor;
   double limit;
   double typical;
-  double novel;
-  double remote;
+  double outlying;
+  double far;
   double middle;
   double slope;
   ec_series nearness;

@@ -179,7 +179,7 @@ ec_refusal ec_open(const void *address);
 #define EC_KERNEL_CELLS EC_SIZE(kernel_cells)
 #define EC_ZONE_CHANNELS EC_SIZE(zone_channels)
 #define EC_CHANNELS EC_SIZE(channels)
-#define EC_HAS_NOVELTY (EC_MOST_HAS_NOVELTY && EC_SIZE(has_novelty))
+#define EC_HAS_OUTLIERS (EC_MOST_HAS_OUTLIERS && EC_SIZE(has_outliers))
 #define ec_angles ec_model_now.angles
 #define ec_links ec_model_now.links
 #define ec_limits ec_model_now.limits
@@ -215,8 +215,8 @@ typedef struct {
 } ec_answer;
 
 typedef struct {
-  double novelty;
-  double remoteness;
+  double outlier_score;
+  double known_distance;
   bool out_of_range;
 } ec_scores;
 

@@ -15,7 +15,7 @@ import pytest
 from edge import demo
 from edge.decide.classifier import Classifier
 from edge.decide.events import Decided
-from edge.decide.info import Novelty, margin
+from edge.decide.info import OutlierLimits, margin
 from edge.decide.model import Model
 from edge.elementary import logistic
 from edge.errors import InputError
@@ -52,8 +52,8 @@ from train.importers import sdh2
 
 @pytest.fixture(scope="module")
 def early(tmp_path_factory):
-    """A model that decides early, of features of every kind, with a product and ties,
-    and touches new to it."""
+    """A model that decides early, of features of every kind, with a joint task and
+    ties, and touches new to it."""
     folder = tmp_path_factory.mktemp("early")
     for i, recording in enumerate(pressed(touch, range(8))):
         save(folder / "data" / f"{i:02d}.npz", recording)
@@ -61,7 +61,7 @@ def early(tmp_path_factory):
     words += ["--k", "2", "--decision-points", "0.3,0.6,1.2", "--c", folder / "c"]
     out = export(folder / "out", "--data", folder / "data", *words)
     model = Model(out / "model.onnx")
-    assert model.info.products.keys() == {"category"}
+    assert model.info.joint_tasks.keys() == {"category"}
     rng = np.random.default_rng(5)
     touches = list(pressed(touch, range(30, 32)))
     touches.append(in_a_row(touch(seed=50, seconds=0.5), touch(seed=51)))
@@ -102,21 +102,25 @@ def on_its_limits(model, recording, ulps):
     answers = [model.run(vectors[i : i + 1], i) for i in points]
     limits, far = (
         tuple((a[name] - ulps * np.spacing(a[name])).item() for a in answers)
-        for name in ("novelty", "remoteness")
+        for name in ("outlier_score", "known_distance")
     )
     stopping = {}
     for task, of_task in info.stopping.items():
         label = answers[0][f"{task}_label"].item()
         evidence = margin(answers[0][f"{task}_label_distances"][0].tolist(), label)
         log_odds = of_task.slope * evidence + of_task.intercept
-        excess = info.novelty.excess(0, answers[0]["novelty"].item())
+        excess = info.outlier_score.excess(0, answers[0]["outlier_score"].item())
         sure = logistic(log_odds - of_task.doubt * excess)
         sure += task == "softness"
         rules = [replace(r, confidence=sure, last=points[-1]) for r in of_task.rules]
-        remoteness = of_task.remoteness and replace(of_task.remoteness, limits=far)
-        stopping[task] = replace(of_task, rules=tuple(rules), remoteness=remoteness)
-    novelty = replace(info.novelty, limits=limits)
-    return replace(info, stopping=stopping, novelty=novelty)
+        known_distance = of_task.known_distance and replace(
+            of_task.known_distance, limits=far
+        )
+        stopping[task] = replace(
+            of_task, rules=tuple(rules), known_distance=known_distance
+        )
+    outlier_score = replace(info.outlier_score, limits=limits)
+    return replace(info, stopping=stopping, outlier_score=outlier_score)
 
 
 def half_millionths(info):
@@ -131,7 +135,7 @@ def half_millionths(info):
         x = next(value for value in near if logistic(value) == likely)
         zeros = (0.0,) * len(of_task.slopes)
         curves = {"slopes": zeros, "doubts": zeros, "intercepts": (x,) * len(zeros)}
-        stopping[task] = replace(of_task, remoteness=None, **curves)
+        stopping[task] = replace(of_task, known_distance=None, **curves)
     return replace(info, stopping=stopping)
 
 
@@ -175,7 +179,7 @@ def test_a_pair_of_labels_that_was_never_met_has_no_name(tmp_path, monkeypatch):
 
 @pytest.mark.slow
 @needs_gcc
-def test_of_products_that_are_as_near_the_first_is_named(tmp_path):
+def test_of_joint_labels_that_are_as_near_the_first_is_named(tmp_path):
     """Each training touch stands under both labels of mobility."""
     for i, recording in enumerate(pressed(touch, range(8))):
         for mobility in ("by 0", "by 5"):
@@ -510,12 +514,14 @@ def test_what_does_not_fit_the_flash_is_left_out_and_said(early, tmp_path, monke
         for options in ((error,), (None,), (None, False))
     ]
     early_out = "; early decisions are left out to fit --flash"
-    no_novelty = "; novelty is left out to fit --flash: nothing is unusual or unknown"
+    no_outlier_score = (
+        "; the outlier score is left out to fit --flash: nothing is unusual or unknown"
+    )
     for error_rate, flash_kb, said in (
         (error, sizes[0] + 1, " Hz)"),
         (error, sizes[0], f" Hz){early_out}"),
-        (None, sizes[1], f" Hz){no_novelty}"),
-        (error, sizes[1], f" Hz){early_out}{no_novelty}"),
+        (None, sizes[1], f" Hz){no_outlier_score}"),
+        (error, sizes[1], f" Hz){early_out}{no_outlier_score}"),
     ):
         text = c_code.export(model, tmp_path, error_rate, flash_kb)
         assert text.split(", and confidence")[0].endswith(said)
@@ -524,10 +530,10 @@ def test_what_does_not_fit_the_flash_is_left_out_and_said(early, tmp_path, monke
     assert not (tmp_path / "none").exists()
     info = model.info
     never = (np.inf,) * len(model.decision_points_s)
-    stopping = {k: replace(v, remoteness=None) for k, v in info.stopping.items()}
-    novelty = Novelty(never, never)
+    stopping = {k: replace(v, known_distance=None) for k, v in info.stopping.items()}
+    outlier_score = OutlierLimits(never, never)
     monkeypatch.setattr(
-        model, "info", replace(info, novelty=novelty, stopping=stopping)
+        model, "info", replace(info, outlier_score=outlier_score, stopping=stopping)
     )
     assert_same_events(model, tmp_path, machine.compiled(tmp_path), touches)
 

@@ -144,8 +144,8 @@ def test_an_unknown_thing_has_no_name_but_a_kind_at_once(
     hasty, make_touch, change, window_s
 ):
     model, error = hasty
-    remoteness = model.info.stopping["object"].remoteness
-    change("object", remoteness=replace(remoteness, limits=(0.0, 0.0, 0.0)))
+    known_distance = model.info.stopping["object"].known_distance
+    change("object", known_distance=replace(known_distance, limits=(0.0, 0.0, 0.0)))
     touch = make_touch(kind="hard", seed=50)
     events = decided(model, touch, error if window_s < 1.2 else None)
     name = events["object"]
@@ -200,7 +200,7 @@ def agreeing(make_touch, tmp_path_factory):
 @pytest.mark.parametrize("rate", [None, 0.3, 0.5, 0.9])
 def test_no_decision_contradicts_another(agreeing, make_touch, rate):
     _, model = agreeing
-    assert model.info.products.keys() == {"category"}
+    assert model.info.joint_tasks.keys() == {"category"}
     for recording in pressed(make_touch, range(50, 55)):
         events = decided(model, recording, rate)
         factors = [events[task] for task in ("softness", "mobility")]

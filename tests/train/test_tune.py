@@ -24,8 +24,8 @@ GAP = slice(25, 60)
 
 
 def touch(label, seed, *, first=(300, 300), gap=GAP):
-    """A touch of 3 s that `soft` and `hard` things answer alike before the gap, but for
-    `first`, and by 200 and 600 counts after it."""
+    """A touch of 3 s that `soft` and `hard` objects answer alike before the gap, but
+    for `first`, and by 200 and 600 counts after it."""
     rng = np.random.default_rng(seed)
     t = np.arange(150) / HZ
     level = np.full(150, 200.0 if label == "soft" else 600.0)

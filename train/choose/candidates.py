@@ -13,7 +13,7 @@ from train.choose.options import FitOptions
 from train.choose.search import NEIGHBOURS, SHRINKAGES, SearchGrid
 from train.data.feature_sets import expand
 from train.data.vectors import Labels
-from train.model.agreement import products
+from train.model.agreement import joint_tasks
 from train.model.pipeline import Choice
 from train.model.projection import KINDS
 from train.model.scaling import BY_COLUMN
@@ -45,8 +45,8 @@ WITH_JOINTS = (
     ("moments", "zone_kernels", "joints"),
 )
 """Those for recordings with joint angles, whose changes show how far the object gave
-way. The arm tells that an object has begun to move before the skin does, and roots let a
-small motion count."""
+way. The arm tells that an object has begun to move before the skin does, and roots let
+a small motion count."""
 WITH_SHEAR = (
     ("contact", "shear"),
     ("moments", "shear"),
@@ -62,8 +62,8 @@ OF_SKIN = (
     ("sqrt_taxels", "kernels"),
 )
 OF_JOINTS = (("joints",), ("joints", "posture"))
-"""For known objects, each of `OF_SKIN` is a candidate with each of these, and with shear
-and without, where the recordings have them."""
+"""For known objects, each of `OF_SKIN` is a candidate with each of these, and with
+shear and without, where the recordings have them."""
 DRAWN = ("contact",)
 DRAWN_WITH_JOINTS = ("contact", "joints")
 """The combination tried for touches of simulated objects that are drawn from kinds
@@ -92,7 +92,8 @@ class Candidate:
         sets: names of feature sets and of single features.
         projection: one of `train.model.projection.KINDS`.
         grids: the settings tried with them.
-        known: whether it is tried for known objects alone, where no groups are left out.
+        known: whether it is tried for known objects alone, where no groups are left
+            out.
     """
 
     sets: tuple[str, ...]
@@ -247,7 +248,7 @@ def _with_targets(grid: SearchGrid, y: Labels, mode: Mode) -> list[SearchGrid]:
     complete = {task: labels for task, labels in y.items() if (labels != "").all()}
     if grid.projection == "pca" or not mode.together or len(complete) < 2:
         return [grid]
-    pairs = products(complete)
+    pairs = joint_tasks(complete)
     together = tuple(task for task in sorted(complete) if task not in pairs)
     return [grid, replace(grid, targets=together)]
 

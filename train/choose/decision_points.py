@@ -7,7 +7,7 @@ from train.choose.options import FitOptions
 from train.choose.settings import Settings
 from train.data.dataset import DataSet
 from train.data.vectors import MOST_ROWS
-from train.model.novelty import MOST_COMPONENTS
+from train.model.outlier_score import MOST_COMPONENTS
 from train.model.pipeline import Choices
 from train.model.stopping import FEWEST
 
@@ -79,15 +79,15 @@ def _size(points: int, dataset: DataSet, settings: Settings, samples: int) -> in
     columns = sum(dataset.widths(samples))
     trials = min(len(dataset.trials), MOST_ROWS)
     shared = 2 * MOST_COMPONENTS * columns
-    novelty = MOST_COMPONENTS * (2 * trials + 4 * MOST_COMPONENTS)
-    novelty += 8 * columns + 24 * trials
+    outlier_score = MOST_COMPONENTS * (2 * trials + 4 * MOST_COMPONENTS)
+    outlier_score += 8 * columns + 24 * trials
     early = settings.choices
     if settings.early is not None:
         early = {**early, **settings.early.choices}
     rows = settings.rows(dataset)
     full = _bytes_of(settings.choices, dataset, samples, rows)
-    before = (points - 1) * (novelty + _bytes_of(early, dataset, samples, rows))
-    return shared + before + novelty + full
+    before = (points - 1) * (outlier_score + _bytes_of(early, dataset, samples, rows))
+    return shared + before + outlier_score + full
 
 
 def _bytes_of(choices: Choices, dataset: DataSet, samples: int, rows: int) -> int:

@@ -60,7 +60,7 @@ class SureDecisions:
 
         Args:
             answered: at each decision point.
-            parts: the task, or the factors of a product, which is decided when both
+            parts: the task, or the factors of a joint task, which is decided when both
                 are.
             seconds: (points,) windows.
         """

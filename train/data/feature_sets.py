@@ -10,8 +10,8 @@
 
 `contact`: how force grows, with area and with motion. It recognises objects that were
 not in the training data. Logarithms turn a product into a sum, so objects that differ
-by a factor differ by a shift. Five times are enough for such smooth courses; more of
-them fit the objects trained on.
+by a factor differ by a shift. Five times are enough for such smooth time series; more
+of them fit the objects trained on.
 
 | feature | unit | from |
 |---|---|---|

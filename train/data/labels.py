@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence
 from itertools import chain, permutations
 
 from edge.errors import InputError
-from edge.record.labels import CATEGORY, Product
+from edge.record.labels import CATEGORY, JointTask
 from edge.record.recording import Recording, read_labels
 
 NO_CONTACT = "none"
@@ -52,9 +52,9 @@ def completed(trials: Sequence[Mapping[str, str]]) -> list[dict[str, str]]:
     out = [dict(labels) for labels in trials]
     names = sorted(tasks | {CATEGORY.task, *CATEGORY.factors})
     for task, first, second in permutations(names, 3):
-        product = Product(task, (first, second))
-        if _holds(product, sound):
-            out = [product.completed(labels) for labels in out]
+        joint = JointTask(task, (first, second))
+        if _holds(joint, sound):
+            out = [joint.completed(labels) for labels in out]
     return [
         {task: label for task, label in labels.items() if task in tasks}
         for labels in out
@@ -68,16 +68,16 @@ def contradictory(trials: Sequence[Mapping[str, str]]) -> list[Mapping[str, str]
     return odd if 2 * len(odd) < len(trials) else []
 
 
-def _holds(product: Product, trials: Sequence[Mapping[str, str]]) -> bool:
-    """Whether a product's labels are those of its factors in every trial that has all
-    three; where none has, whether it is `CATEGORY`."""
-    complete = {product.task, *product.factors}
+def _holds(joint: JointTask, trials: Sequence[Mapping[str, str]]) -> bool:
+    """Whether a joint task's labels are those of its factors in every trial that has
+    all three; where none has, whether it is `CATEGORY`."""
+    complete = {joint.task, *joint.factors}
     matches = [
-        product.label(labels) == labels[product.task]
+        joint.label(labels) == labels[joint.task]
         for labels in trials
         if labels.keys() >= complete
     ]
-    return all(matches) if matches else product == CATEGORY
+    return all(matches) if matches else joint == CATEGORY
 
 
 def shared_tasks(

@@ -9,13 +9,14 @@ from train.data.groups import LEAVE_OUT
 from train.data.vectors import Labels, Strings
 
 
-def products(y: Labels) -> dict[str, tuple[str, str]]:
+def joint_tasks(y: Labels) -> dict[str, tuple[str, str]]:
     """{task: two other tasks whose labels together determine its own, and follow from
     it}.
 
-    Neither of the two determines the task alone, and neither names objects: `object`, or
-    the task with most labels. Of several pairs the one is taken whose labels the task's
-    words are made of, as `rigid-fixed` is, or else the one with the fewest labels.
+    Neither of the two determines the task alone, and neither names objects: `object`,
+    or the task with most labels. Of several pairs the one is taken whose labels the
+    task's words are made of, as `rigid-fixed` is, or else the one with the fewest
+    labels.
     """
     pairs: dict[str, tuple[str, str]] = {}
     names_objects = {LEAVE_OUT, finest(y)}
@@ -55,28 +56,28 @@ def _determines(a: Strings, b: Strings) -> bool:
 
 
 def factors_of(y: Labels) -> dict[str, dict[str, tuple[int, ...]]]:
-    """{product: its `edge.decide.agreement.Factors`}.
+    """{joint task: its `edge.decide.agreement.Factors`}.
 
-    No task belongs to two products.
+    No task belongs to two joint tasks.
     """
-    products_of: dict[str, dict[str, tuple[int, ...]]] = {}
+    joint_tasks_of: dict[str, dict[str, tuple[int, ...]]] = {}
     used_tasks: set[str] = set()
-    for task, factors in products(y).items():
+    for task, factors in joint_tasks(y).items():
         tasks = (task, *factors)
         rows = set(zip(*(y[t].tolist() for t in tasks), strict=True))
         pairs = sorted(filter(all, rows))
         names = [sorted({*y[factor].tolist()} - {""}) for factor in factors]
         columns = [[pair[i] for pair in pairs] for i in (1, 2)]
-        # A factor's label may be that of trials without a label of the product.
+        # A factor's label may be that of trials without a label of the joint task.
         paired = [sorted({*column}) for column in columns] == names
         if paired and used_tasks.isdisjoint(tasks):
             used_tasks.update(tasks)
-            products_of[task] = {}
+            joint_tasks_of[task] = {}
             for factor, labels, column in zip(factors, names, columns, strict=True):
-                products_of[task][factor] = tuple(map(labels.index, column))
-    return products_of
+                joint_tasks_of[task][factor] = tuple(map(labels.index, column))
+    return joint_tasks_of
 
 
 def families(y: Labels) -> list[tuple[str, ...]]:
-    """The tasks that are decided together: a product and its two factors each."""
+    """The tasks that are decided together: a joint task and its two factors each."""
     return [(task, *factors) for task, factors in factors_of(y).items()]

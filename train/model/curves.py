@@ -20,15 +20,17 @@ PULL = 0.5
 """Weight of the prior of a margin's slope, 1 a standard deviation, and of the
 intercept's, 0."""
 DOUBT = 1.0
-"""Prior of the doubt: odds fall as the novelty rises above that of half of the trials."""
+"""Prior of the doubt: odds fall as the outlier score rises above that of half of the
+trials."""
 DOUBT_PULL = 10.0
 """Weight of this prior for an excess of a standard deviation. It is heavy because few
 held-out trials are as novel as what a robot may meet."""
 LEAST_DOUBT = 0.5
-"""The odds fall at least by the root of the novelty, for the same reason."""
+"""The odds fall at least by the root of the outlier score, for the same reason."""
 WITHHELD = 0.5
 """Part of the mean confidence that doubt about the object takes from known objects, and
-that is not given back. With all of it given back, objects that were never met are surely
+that is not given back. With all of it given back, objects that were never met are
+surely
 named; with none, known objects are called too doubtful (docs/measured.md)."""
 LEAST_SLOPE = 1e-3
 """Smallest slope a standard deviation: a larger margin never makes a label less
@@ -39,8 +41,10 @@ likely."""
 class Curve:
     """The probability that a label is right.
 
-    It is the logistic function of slope * margin + intercept - doubt * excess, where the
-    excess is the part of the novelty above that of half of the trials (`excess_of`).
+    It is the logistic function of slope * margin + intercept - doubt * excess, where
+    the
+    excess is the part of the outlier score above that of half of the trials
+    (`excess_of`).
     """
 
     slope: float
@@ -109,7 +113,7 @@ class Evidence:
 
     Attributes:
         margins: of the labels.
-        excess: of the contacts' novelty.
+        excess: of the contacts' outlier scores.
         right: whether the labels are right.
         honest: whether those are right whose settings were chosen without the trials.
         known: probability that the object is one of those in training, by which that of

@@ -3,25 +3,27 @@
 Known objects say nothing of others: a confidence that is right for them may be high for
 what was never met. So the trials of some objects are scored, and answered, by fits
 without any trial of these objects. Logistic regression then tells known from held-out
-objects by remoteness (`train.model.novelty`), as if a share `SHARE` of all contacts were
-with the latter. The confidence of the task that names objects is multiplied by this
-probability that the object is known. Its curve is raised by half of that
-(`train.model.curves.WITHHELD`), so that known objects are not called too doubtful.
+objects by the distance to known objects (`train.model.outlier_score`), as if a share
+`SHARE` of all contacts were with the latter. The confidence of the task that names
+objects is multiplied by this probability that the object is known. Its curve is raised
+by half of that (`train.model.curves.WITHHELD`), so that known objects are not called
+too doubtful.
 """
 
 import numpy as np
 from sklearn.linear_model import LogisticRegression
 
 from edge.arrays import Booleans, Floats, Integers
-from edge.decide.info import Remoteness
+from edge.decide.info import KnownDistance
 from edge.elementary import log
 from train.data.folds import group_folds
 from train.data.vectors import Strings
 from train.model.curves import board_logistic
-from train.model.novelty import LEAST, UNKNOWN_RATE, limits_of
+from train.model.outlier_score import LEAST, UNKNOWN_RATE, limits_of
 
 SHARE = 0.1
-"""Share of contacts with objects that were never met. With a larger one, doubt about the
+"""Share of contacts with objects that were never met. With a larger one, doubt about
+the
 object says less of which names of known objects are right (docs/measured.md)."""
 FEWEST_OBJECTS = 5
 """Where there are fewer, what remains of a fold says little of the model."""
@@ -29,8 +31,8 @@ MOST_FOLDS = 10
 TINY = 1e-300
 USUAL_SLOPE = 4.0
 USUAL_MIDDLE = 2.2
-"""The curve where nothing can be held out, with its middle over the typical score: about
-that of simulated and of real objects."""
+"""The curve where nothing can be held out, with its middle over the typical score:
+about that of simulated and of real objects."""
 LEAST_SLOPE = 0.5
 """So that the middle is no power out of reach."""
 PULL = 10.0
@@ -47,33 +49,34 @@ def object_folds(labels: Strings) -> Integers | None:
     return np.where(labels == "", -1, group_folds(labels, MOST_FOLDS))
 
 
-def remoteness_of(known: Floats, unseen: Floats | None) -> Remoteness:
-    """The limits and the curves of remoteness.
+def known_distance_of(known: Floats, unseen: Floats | None) -> KnownDistance:
+    """The limits and the curves of the distance to known objects.
 
     Args:
-        known: (decision points, n) remoteness of contacts held out by themselves.
+        known: (decision points, n) the distance to known objects of contacts held out
+            by themselves.
         unseen: (decision points, m) of those with objects that were held out; None
             where none could be.
     """
     typical, limits = limits_of(known, UNKNOWN_RATE)
     if unseen is None:
         middles = tuple(USUAL_MIDDLE * score for score in typical)
-        return Remoteness(limits, middles, (USUAL_SLOPE,) * len(middles))
+        return KnownDistance(limits, middles, (USUAL_SLOPE,) * len(middles))
     middles, slopes = zip(*map(_curve, known, unseen), strict=True)
-    return Remoteness(limits, middles, slopes)
+    return KnownDistance(limits, middles, slopes)
 
 
-def known_of(remoteness: Remoteness, scores: Floats) -> Floats:
+def known_of(known_distance: KnownDistance, scores: Floats) -> Floats:
     """(decision points, n) probabilities that objects are known, as the board has them
-    (`edge.decide.info.Remoteness.known`), from their remoteness."""
-    middles = np.array(remoteness.middles)[:, None]
-    slopes = np.array(remoteness.slopes)[:, None]
+    (`edge.decide.info.KnownDistance.known`), from their distances to known objects."""
+    middles = np.array(known_distance.middles)[:, None]
+    slopes = np.array(known_distance.slopes)[:, None]
     return board_logistic(slopes * log(middles / np.maximum(scores, TINY)))
 
 
 def _curve(known: Floats, unseen: Floats) -> tuple[float, float]:
-    """Middle and slope of a decision point, by the remoteness of contacts (n,) and
-    (m,)."""
+    """Middle and slope of a decision point, by the distance to known objects of
+    contacts (n,) and (m,)."""
     logs = np.log(np.maximum(np.concatenate([known, unseen]), LEAST))
     is_known = np.arange(len(logs)) < len(known)
     ratio = SHARE / (1.0 - SHARE) * len(known) / len(unseen)

@@ -188,8 +188,8 @@ class FittedSpace:
     Attributes:
         columns: of the vectors, that it takes, rising.
         projection: with the components of the task that has most.
-        members: (m,) numbers of the rows among those of a model, rising: the trials that
-            it was fitted on, or their prototypes.
+        members: (m,) numbers of the rows among those of a model, rising: the trials
+            that it was fitted on, or their prototypes.
         trials: (m,) the trial next to each row.
         rows: (m, c) these trials, projected, or the means of the prototypes' trials.
     """
@@ -338,7 +338,7 @@ class ContactClassifier:
             task: replace(fitted[task], slope=slopes[task, replace(choice, k=1)])
             for task, choice in self.choices.items()
         }
-        self.products_ = factors_of({task: vectors.y[task] for task in self.choices})
+        self.joint_tasks_ = factors_of({task: vectors.y[task] for task in self.choices})
         return self
 
     @property
@@ -364,7 +364,7 @@ class ContactClassifier:
             labels[task], distances[task] = map(
                 np.concatenate, zip(*by_block, strict=True)
             )
-        for task, factors in self.products_.items():
+        for task, factors in self.joint_tasks_.items():
             together, nearest_answers = agreed(task, factors, distances)
             labels |= together
             distances |= nearest_answers

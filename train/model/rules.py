@@ -13,9 +13,9 @@ way to it, and one table of rules serves every `error`. The confidences for the 
 a fold's trials come from a logistic regression on the other folds.
 
 Tasks that agree (`edge.decide.agreement`) have one rule: the factors are decided when
-each is sure, their product when both are, and the tests count the product's errors.
-Below the smallest error that is certified for the product, its factors wait for the
-full window with it (`agreeing`).
+each is sure, their joint task when both are, and the tests count the joint task's
+errors. Below the smallest error that is certified for the joint task, its factors wait
+for the full window with it (`agreeing`).
 
 The tests are exact for the average of the folds' models. The exported model is fitted
 on all trials, a tenth (or a fifth) more, with its own choice of settings. On average it
@@ -75,8 +75,8 @@ class TimeSeries:
 
     Attributes:
         confidences: (decision points, n) of each part, by its curve of all points. The
-            parts of a product are its two factors, and it is decided when both are; any
-            other task is its only part.
+            parts of a joint task are its two factors, and it is decided when both are;
+            any other task is its only part.
         wrong: (decision points, n) of each part.
         unusual: (decision points, n) whether the contact is unlike all trained ones.
         withheld: (decision points, n) whether the task names nothing, as the object is
@@ -157,41 +157,41 @@ def certify(time_series: TimeSeries, seconds: Floats) -> list[StoppingRule]:
 
 
 def agreeing(
-    product: str,
+    joint: str,
     factors: Collection[str],
     rules: Mapping[str, Sequence[StoppingRule]],
     series: Mapping[str, TimeSeries],
     seconds: Floats,
 ) -> dict[str, list[StoppingRule]]:
-    """{task: its rules} of a product and of its factors, which follow the product's
-    rules at a pace of their own.
+    """{task: its rules} of a joint task and of its factors, which follow the joint
+    task's rules at a pace of their own.
 
-    A factor is wrong only where its product is, so it may follow the product's rules.
-    Before them it waits for the full window: a product that is not certified must not
-    be made of early factors. No rule is slower for a factor than those before it. The
-    product, which takes its factors' labels, has the rules that both follow.
+    A factor is wrong only where its joint task is, so it may follow the joint task's
+    rules. Before them it waits for the full window: a joint task that is not certified
+    must not be made of early factors. No rule is slower for a factor than those before
+    it. The joint task, which takes its factors' labels, has the rules that both follow.
 
     Args:
-        product: a task.
+        joint task: a task.
         factors: its factors.
         rules: {task: its certified rules}.
         series: {task: its time series}.
         seconds: (points,) windows.
     """
-    least = rules[product][0].error
+    least = rules[joint][0].error
     agreed = {}
     for factor in factors:
         waiting = at_full_window(series[factor], seconds)
         agreed[factor] = [waiting] if waiting.error < least else []
-    of_product: list[StoppingRule] = []
-    for rule in rules[product]:
+    of_joint: list[StoppingRule] = []
+    for rule in rules[joint]:
         followed = _followed(rule, agreed, series, seconds)
-        # A factor that goes on by itself would make the product err more often.
+        # A factor that goes on by itself would make the joint task err more often.
         if len(followed) == len(factors):
-            of_product.append(rule)
+            of_joint.append(rule)
             for factor, of_factor in followed.items():
                 agreed[factor].append(of_factor)
-    return {product: of_product, **agreed}
+    return {joint: of_joint, **agreed}
 
 
 def _followed(

@@ -2,10 +2,10 @@
 
 A model decides at several decision points, each with a window, a projection and
 training rows of its own. Those before the last may have settings of their own too
-(`EarlySettings`): early the arm tells what the skin tells later. Confidence, rules and novelty
-limits are made from trials that the deciding model did not see: the trials are divided
-into folds, and each fold is decided by a model that was fitted, and whose settings were
-chosen, without it.
+(`EarlySettings`): early the arm tells what the skin tells later. Confidence, rules and
+the outlier score limits are made from trials that the deciding model did not see: the
+trials are divided into folds, and each fold is decided by a model that was fitted, and
+whose settings were chosen, without it.
 
 **Confidence.** The margin says how much nearer the training trials of the named label
 lie than those of any other (`edge.decide.info.margin`). Logistic regression turns it
@@ -37,7 +37,7 @@ from dataclasses import astuple, dataclass, replace
 import numpy as np
 
 from edge.arrays import Booleans, Floats, Integers
-from edge.decide.info import Novelty, Stopping, StoppingRule
+from edge.decide.info import OutlierLimits, Stopping, StoppingRule
 from edge.elementary import log
 from edge.errors import InputError
 from edge.features.vector import FEATURES
@@ -54,16 +54,16 @@ from train.model.held_out import (
 )
 from train.model.never_met import (
     SHARE,
+    known_distance_of,
     known_of,
     object_folds,
-    remoteness_of,
     worth_of,
 )
-from train.model.novelty import (
+from train.model.outlier_score import (
     FOLDS,
     FOLDS_OF_MANY,
     UNUSUAL_RATE,
-    NoveltySpace,
+    OutlierSpace,
     Scores,
     beyond,
     held_out_scores,
@@ -92,10 +92,10 @@ class EarlySettings:
     by_fold: Sequence[Choices]
 
 
-def excess_of(novelty: Novelty, scores: Floats) -> Floats:
-    """(points, n) by how much the logarithm of the novelty (points, n) is above that of
-    half of the trials; 0 below."""
-    typical = np.array(novelty.typical)[:, None]
+def excess_of(outlier_score: OutlierLimits, scores: Floats) -> Floats:
+    """(points, n) by how much the logarithm of the outlier score (points, n) is above
+    that of half of the trials; 0 below."""
+    typical = np.array(outlier_score.typical)[:, None]
     ratios = np.maximum(np.nan_to_num(scores), typical) / typical
     return np.asarray(log(ratios))
 
@@ -140,8 +140,8 @@ class SequentialClassifier:
             right}.
         unusual_, unknown_: (decision points, n) the doubts about trials without them.
         stopping_: {task: Stopping}.
-        space_: in which novelty and remoteness are scored.
-        novelty_, remoteness_: their limits.
+        space_: in which the outlier score and the distance to known objects are scored.
+        outlier_score_, known_distance_: their limits.
     """
 
     choices: Choices
@@ -184,7 +184,7 @@ class SequentialClassifier:
         self._folds = folds
         self._tested = {task: (folds >= 0) & (y[task] != "") for task in self.choices}
         inputs = self._fit_points(vectors)
-        self._fit_novelty(inputs, folds)
+        self._fit_outlier_score(inputs, folds)
         early = [{}] * len(fold_choices) if self.early is None else self.early.by_fold
         of_folds = list(map(self._at_points, fold_choices, early))
         of_all = [self.choices_at] * len(of_folds)
@@ -202,8 +202,8 @@ class SequentialClassifier:
         self.stopping_ = self._with_curves(
             self._certified(chosen_without), chosen_by_all, unseen
         )
-        self.remoteness_ = replace(self._bare, worth=self._worth(never_met))
-        named = replace(self.stopping_[self._name], remoteness=self.remoteness_)
+        self.known_distance_ = replace(self._bare, worth=self._worth(never_met))
+        named = replace(self.stopping_[self._name], known_distance=self.known_distance_)
         self.stopping_[self._name] = named
         return self
 
@@ -237,61 +237,63 @@ class SequentialClassifier:
             self.decision_points_ = at_points(self.choices_at, vectors, fits, slopes)
         return vectors
 
-    def _fit_novelty(self, vectors: Vectors, folds: Integers) -> None:
+    def _fit_outlier_score(self, vectors: Vectors, folds: Integers) -> None:
         """Fit the space of doubt, and set its limits by held-out trials."""
-        kinds = {*self.products_}.union(*self.products_.values())
+        kinds = {*self.joint_tasks_}.union(*self.joint_tasks_.values())
         names = self.choices.keys() - kinds or self.choices.keys()
         self._name = finest({task: vectors.y[task] for task in names})
         labels = vectors.y[self._name]
         least = least_deviations(vectors, self.drawn)
         with single_thread():
-            self.space_ = NoveltySpace.of(vectors.X, labels, vectors.columns, least)
+            self.space_ = OutlierSpace.of(vectors.X, labels, vectors.columns, least)
         count = FOLDS if len(labels) <= MOST_ROWS else FOLDS_OF_MANY
-        novelty_folds = np.where(folds >= 0, stratified_folds(labels, count), -1)
+        outlier_folds = np.where(folds >= 0, stratified_folds(labels, count), -1)
 
         def scores_without(folds: Integers) -> Scores:
             return held_out_scores(
                 vectors.X, labels, folds, vectors.columns, self.jobs, least
             )
 
-        scores = scores_without(novelty_folds)
+        scores = scores_without(outlier_folds)
         # A copy of another trial says nothing of how far new ones lie.
-        counted = scores.novelty.min(axis=0) > 0.0
+        counted = scores.outlier_score.min(axis=0) > 0.0
         if counted.sum() < FEWEST:
             counted = folds >= 0
         tested = scores.part(counted)
-        self.novelty_ = Novelty(*limits_of(tested.novelty, UNUSUAL_RATE))
-        self._excess = excess_of(self.novelty_, scores.novelty)
+        self.outlier_score_ = OutlierLimits(
+            *limits_of(tested.outlier_score, UNUSUAL_RATE)
+        )
+        self._excess = excess_of(self.outlier_score_, scores.outlier_score)
         self._objects = object_folds(np.where(folds >= 0, labels, ""))
         left_out = None
         if self._objects is not None:
             self._left_out = scores_without(self._objects)
-            left_out = self._left_out.part(self._objects >= 0).remoteness
-        self._bare = remoteness_of(tested.remoteness, left_out)
-        self._known = known_of(self._bare, scores.remoteness)
-        self.unusual_ = beyond(self.novelty_.limits, scores.novelty)
-        self.unknown_ = beyond(self._bare.limits, scores.remoteness)
+            left_out = self._left_out.part(self._objects >= 0).known_distance
+        self._bare = known_distance_of(tested.known_distance, left_out)
+        self._known = known_of(self._bare, scores.known_distance)
+        self.unusual_ = beyond(self.outlier_score_.limits, scores.outlier_score)
+        self.unknown_ = beyond(self._bare.limits, scores.known_distance)
 
     def _worth(self, never_met: Mapping[str, Evidence]) -> dict[str, float]:
-        """What the doubt about names is worth, by answers to objects that were held out;
-        empty where none could be."""
+        """What the doubt about names is worth, by answers to objects that were held
+        out; empty where none could be."""
         if self._objects is None:
             return {}
         answers = never_met[self._name]
         stopping = self.stopping_[self._name]
         curve = Curve(stopping.slopes[-1], stopping.intercepts[-1], stopping.doubts[-1])
         tested = self._tested[self._name] & (self._objects >= 0)
-        remoteness = self._left_out.remoteness[:, tested]
+        known_distance = self._left_out.known_distance[:, tested]
         confidence = curve.probabilities(answers.margins, answers.excess)
-        confidence = confidence * known_of(self._bare, remoteness)[-1]
-        unknown = beyond(self._bare.limits, remoteness)[-1]
+        confidence = confidence * known_of(self._bare, known_distance)[-1]
+        unknown = beyond(self._bare.limits, known_distance)[-1]
         known = self.unknown_[-1, self._folds >= 0]
         return worth_of(known, unknown, confidence)
 
     def _never_met(self, vectors: Vectors) -> dict[str, Evidence]:
-        """{task: answers at the full window to trials of objects that the deciding model
-        has not met}; none where none could be held out. The vectors are those that the
-        model takes."""
+        """{task: answers at the full window to trials of objects that the deciding
+        model has not met}; none where none could be held out. The vectors are those
+        that the model takes."""
         objects = self._objects
         if objects is None:
             return {}
@@ -300,7 +302,7 @@ class SequentialClassifier:
         (answered,) = held_out(
             at_end, objects, [runs], self.jobs, self.heading, [self.prototypes]
         )
-        excess = excess_of(self.novelty_, self._left_out.novelty)[-1]
+        excess = excess_of(self.outlier_score_, self._left_out.outlier_score)[-1]
         evidence = {}
         for task, tested in self._tested.items():
             answered_to = tested & (objects >= 0)
@@ -330,7 +332,7 @@ class SequentialClassifier:
         rules = {
             task: certify(time_series, seconds) for task, time_series in series.items()
         }
-        for task, factors in self.products_.items():
+        for task, factors in self.joint_tasks_.items():
             rules |= agreeing(task, factors, rules, series, seconds)
         full, _ = candidates(len(seconds))
         certified = {}
@@ -389,17 +391,17 @@ class SequentialClassifier:
         return stopping
 
     @property
-    def products_(self) -> dict[str, dict[str, tuple[int, ...]]]:
+    def joint_tasks_(self) -> dict[str, dict[str, tuple[int, ...]]]:
         """{task: its factors} of the tasks decided together."""
-        return self.decision_points_[-1].products_
+        return self.decision_points_[-1].joint_tasks_
 
     def judged(
         self,
         X: Floats,
         y: Mapping[str, Strings],
     ) -> tuple[dict[str, Booleans], dict[str, Floats], dict[str, TimeSeries]]:
-        """Hits and confidences (points, m) and time series of each task, for trials that are
-        new.
+        """Hits and confidences (points, m) and time series of each task, for trials
+        that are new.
 
         Args:
             X: (points, m, p).
@@ -408,7 +410,7 @@ class SequentialClassifier:
         with single_thread():
             answered = answers(self.decision_points_, X)
         scores = self.space_.scores(X)
-        excess = excess_of(self.novelty_, scores.novelty)
+        excess = excess_of(self.outlier_score_, scores.outlier_score)
         right = {}
         confidence = {}
         together = {}
@@ -420,9 +422,9 @@ class SequentialClassifier:
             curves = map(Curve, stopping.slopes, stopping.intercepts, stopping.doubts)
             by_point = map(Curve.probabilities, curves, margins, excess)
             confidence[task] = np.stack(list(by_point))
-        confidence[self._name] *= known_of(self.remoteness_, scores.remoteness)
-        unusual = beyond(self.novelty_.limits, scores.novelty)
-        doubts = unusual, beyond(self.remoteness_.limits, scores.remoteness)
+        confidence[self._name] *= known_of(self.known_distance_, scores.known_distance)
+        unusual = beyond(self.outlier_score_.limits, scores.outlier_score)
+        doubts = unusual, beyond(self.known_distance_.limits, scores.known_distance)
         tested = {task: y[task] != "" for task in right}
         return right, confidence, self._series(together, right, doubts, tested)
 
@@ -433,16 +435,16 @@ class SequentialClassifier:
         doubts: tuple[Booleans, Booleans],
         tested: Mapping[str, Booleans],
     ) -> dict[str, TimeSeries]:
-        """{task: its time series}, from each task's own answers and confidences for rules
-        (points, n), and whether contacts are unusual and unknown (points, n).
+        """{task: its time series}, from each task's own answers and confidences for
+        rules (points, n), and whether contacts are unusual and unknown (points, n).
 
-        The trials `tested` (n,) count; for a product, those that count for its factors
-        too.
+        The trials `tested` (n,) count; for a joint task, those that count for its
+        factors too.
         """
         series = {}
         unusual, unknown = doubts
         for task in self.choices:
-            deciding = tuple(self.products_.get(task, (task,)))
+            deciding = tuple(self.joint_tasks_.get(task, (task,)))
             decided = np.all([tested[t] for t in (task, *deciding)], axis=0)
             sure = [scores[part][:, decided] for part in deciding]
             wrong = [~right[part][:, decided] for part in deciding]

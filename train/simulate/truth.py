@@ -1,4 +1,4 @@
-"""Draws a trial again where its course contradicts its label.
+"""Draws a trial again where its time series contradicts its label.
 
 Labels are judged in a window after the first touch. In it an object labelled movable
 has to slide, and an object labelled soft has to yield. So it was in the paper ("For an
@@ -33,14 +33,14 @@ class Contradiction:
     Attributes:
         label: `soft`, or the trial's condition.
         reason: for which it is drawn again, such as "moved too little".
-        course: the end of a sentence that begins with the trial, such as "was never
-            touched".
+        time series: the end of a sentence that begins with the trial, such as "was
+            never touched".
         remedy: a change of the scene that may help.
     """
 
     label: str
     reason: str
-    course: str
+    time_series: str
     remedy: str
 
 
@@ -83,11 +83,11 @@ def contradictions(physics: PhysicsRun) -> list[Contradiction | None]:
         reason = ""
         if not touched[i, onset[i]]:
             reason = "never touched"
-            course = "was never touched"
+            time_series = "was never touched"
             remedy = "let [motion] reach it, and turn the skin's columns to it"
         elif trial.condition == "movable" and slide[i] < labels["slides_m"]:
             reason = "moved too little"
-            course = (
+            time_series = (
                 f"moved {1e3 * slide[i]:.0f} mm, less than {1e3 * labels['slides_m']:g}"
             )
             remedy = (
@@ -97,9 +97,11 @@ def contradictions(physics: PhysicsRun) -> list[Contradiction | None]:
         elif depth[i] < labels["yields"] * thickness:
             label = "soft"
             reason = "yielded too little"
-            course = f"yielded {100 * depth[i] / thickness:.1f} % of {1e3 * thickness:.0f} mm"
+            time_series = f"yielded {100 * depth[i] / thickness:.1f} % of {1e3 * thickness:.0f} mm"
             remedy = "lower its stiffness, or labels.yields"
-        out.append(Contradiction(label, reason, course, remedy) if reason else None)
+        out.append(
+            Contradiction(label, reason, time_series, remedy) if reason else None
+        )
     return out
 
 
@@ -140,7 +142,7 @@ def _next_draws(
         raise InputError(
             f"{scene.name}: object {last.object.name!r} is labelled {wrong.label}, but "
             f"each of {REDRAWS} draws contradicted that within "
-            f"{scene.labels['window_s']:g} s of the touch (the last {wrong.course}); "
+            f"{scene.labels['window_s']:g} s of the touch (the last {wrong.time_series}); "
             f"{wrong.remedy}"
         )
     for attempt in range(first, min(first + AHEAD * first, REDRAWS)):

@@ -92,7 +92,7 @@ class Page:
         self.recording = bool(self.labels) and not self._waits
         self._touches: dict[str, Touch] = {}
         """Those of the folder by file, the newest first."""
-        self._courses: dict[str, Json] = {}
+        self._time_series: dict[str, Json] = {}
         """The seconds and the curve of touches that have been shown."""
         self._notices: deque[str] = deque(maxlen=LAST_NOTICES)
         self._version = 0
@@ -248,7 +248,8 @@ class Page:
 
     def _list(self, folder: Path, action: Json) -> Json:
         """Some touches of those that a word selects, how many these are, the words with
-        the number of their touches, and what is doubtful about the next one's labels."""
+        the number of their touches, and what is doubtful about the next one's
+        labels."""
         touches = list(self._touches.values())
         labels = [touch.standing.labels for touch in touches]
         doubtful = doubts([*labels, self.labels])
@@ -275,16 +276,19 @@ class Page:
     def _row(self, touch: Touch, sentences: Sequence[str]) -> Json:
         """What the list says of a touch, with what is doubtful about its labels."""
         file = touch.path.name
-        if file not in self._courses:
-            self._courses[file] = {"seconds": 0.0, "curve": []}
+        if file not in self._time_series:
+            self._time_series[file] = {"seconds": 0.0, "curve": []}
             with self._naming():
                 trial = load(touch.path)
                 seconds = round(float(np.ptp(trial.t)), 2)
-                self._courses[file] = {"seconds": seconds, "curve": review.curve(trial)}
+                self._time_series[file] = {
+                    "seconds": seconds,
+                    "curve": review.curve(trial),
+                }
         return {
             "file": file,
             **touch.standing._asdict(),
-            **self._courses[file],
+            **self._time_series[file],
             "decided": review.decisions(touch.meta),
             "accepted": review.accepted(touch.meta, touch.standing.labels),
             "kinds": touch.kinds,

@@ -1,4 +1,4 @@
-"""The elastic layer of `mujoco_touch`: the face of every soft thing except a plant."""
+"""The elastic layer of `mujoco_touch`: the face of every soft object except a plant."""
 
 import mujoco
 import numpy as np
@@ -110,7 +110,7 @@ class Rub:
         self.thing = model.body("thing").id
 
     def hold(self, data, loads):
-        """Set the pull of this step on arm and thing, from the pads' loads (n,)."""
+        """Set the pull of this step on arm and object, from the pads' loads (n,)."""
         data.qfrc_applied[:] = 0.0
         most = self.friction * float(loads.sum())
         if most == 0.0:

@@ -1,10 +1,10 @@
 """Touches in another physics engine, MuJoCo: an arm, its skin of sprung pads, and a
-thing.
+object.
 
 The arm is Cody's chain with its masses on gravity-compensated links, driven by an
-impedance controller. Each taxel that can meet the thing is a pad on a spring along its
-normal, and reads the spring's force. The thing stands on a floor under gravity, or is
-clamped. A soft thing has an elastic layer (`mujoco_layer`); a plant is a set of hinged
+impedance controller. Each taxel that can meet the object is a pad on a spring along its
+normal, and reads the spring's force. The object stands on a floor under gravity, or is
+clamped. A soft object has an elastic layer (`mujoco_layer`); a plant is a set of hinged
 stems.
 """
 
@@ -30,7 +30,7 @@ RATE_DEG_S = 20.0
 LEAD_S = 0.3
 TOUCH_S = 1.8
 RATE_HZ = 100
-"""Seconds before the arm meets a rigid thing, and after that at the usual speed."""
+"""Seconds before the arm meets a rigid object, and after that at the usual speed."""
 G_M_S2 = 9.81
 PLACE_M = 0.10
 COUNTS_PER_NEWTON = 1000.0
@@ -44,7 +44,7 @@ NOISE_COUNTS = 6.0
 RADIUS_M = 0.04604
 ROWS = 16
 FACING_DEG = 76.0
-"""A taxel whose normal lies farther from the push than this cannot meet the thing."""
+"""A taxel whose normal lies farther from the push than this cannot meet the object."""
 PAD_M = 0.0048
 PAD_KG = 0.02
 PAD_LOSS_S = 0.0015
@@ -57,12 +57,12 @@ STEMS_STEP_S = 0.00025
 """Stems of 10 g hop in steps as long as the contact's time constant."""
 RIGID_KINDS = ("box", "drum")
 HALF_M = 0.08
-"""Half the length of a thing's foot along the push, and at least half its breadth."""
+"""Half the length of an object's foot along the push, and at least half its breadth."""
 
 
 @dataclass(frozen=True)
 class Thing:
-    """The thing that is touched.
+    """The object that is touched.
 
     Attributes:
         kind: box, drum, foam, cushion, bale or plant.
@@ -99,12 +99,12 @@ class Thing:
 
 @dataclass(frozen=True)
 class Touch:
-    """How the thing is touched; the defaults are those of a perfect machine.
+    """How the object is touched; the defaults are those of a perfect machine.
 
     Attributes:
         start_rad: (dof,) added to the arm's first angles.
         place_m: place of the contact along the forearm, from the wrist.
-        aside_m, yaw_rad: the thing's distance beside the push, and its turn.
+        aside_m, yaw_rad: the object's distance beside the push, and its turn.
         slope_rad: slope of the table along the push.
         taxel_n_m: stiffness of the pads.
         speed, stiffness: of the arm, in units of Cody's; its damping ratio stays.
@@ -217,7 +217,7 @@ def stems_xml(thing):
 
 
 def upper_xml(thing):
-    """What stands on the thing's foot, and the springs and the face of a layer."""
+    """What stands on the object's foot, and the springs and the face of a layer."""
     if thing.layered:
         return mujoco_layer.layer_xml(thing)
     if thing.soft:
@@ -234,8 +234,8 @@ def upper_xml(thing):
 
 
 def meeting(touch):
-    """The arm's pose (4, 4) as it meets the thing, the point where it does (3,), and the
-    heading of that point in radians."""
+    """The arm's pose (4, 4) as it meets the object, the point where it does (3,), and
+    the heading of that point in radians."""
     pose = ARM.pose(touch.begin_rad + touch.rate_rad_s * LEAD_S)
     later = ARM.pose(touch.begin_rad + touch.rate_rad_s * (LEAD_S + 0.01))
     on = np.array([0.0, 0.0, touch.place_m, 1.0])
@@ -295,7 +295,7 @@ def simulate(touch):
     """One touch, as the board would have recorded it.
 
     Returns:
-        The recording, and (n,) metres that the thing has moved at the height of the
+        The recording, and (n,) metres that the object has moved at the height of the
         contact, which the skin cannot see.
     """
     model, where = model_of(touch)
@@ -316,7 +316,7 @@ def simulate(touch):
     def felt():
         return np.maximum(-touch.pad_n_m * pushed, 0.0)
 
-    # A soft thing is felt later, the more so the slower the arm.
+    # A soft object is felt later, the more so the slower the arm.
     lasts_s = LEAD_S + TOUCH_S + 0.6 * max(1.0 / touch.speed - 1.0, 0.0)
     t = np.arange(round(lasts_s * RATE_HZ) + 1) / RATE_HZ
     loads = np.zeros((len(t), ROWS, CODY_SKIN["cols"]))

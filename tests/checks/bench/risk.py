@@ -6,10 +6,10 @@ features,
 projection and neighbours. Its promises are judged on all trials that were not drawn:
 these have streams of their own, as those of another seed have.
 
-A certified error may be exceeded in one data set of ten (`train.model.rules.RISK`), counted
-over all sets, also those whose request was refused. Of the few sets that certify an
-error close to the lowest that the trials can reach, more than a tenth exceed it,
-because only lucky sets certify it. The row "the smallest" counts the smallest error
+A certified error may be exceeded in one data set of ten (`train.model.rules.RISK`),
+counted over all sets, also those whose request was refused. Of the few sets that
+certify an error close to the lowest that the trials can reach, more than a tenth exceed
+it, because only lucky sets certify it. The row "the smallest" counts the smallest error
 that each set certifies. A set is late where it decides `LATE_S` later on average than
 promised.
 
@@ -20,8 +20,8 @@ prints. The accuracy on other trials may lie outside it in one data set of twent
 The last table judges the confidence at the full window on new trials of known objects:
 its calibration error, and how many of them are flagged `unknown`, where 1.25 % are
 asked for. Further rows are of data sets that are exported in full but for four objects,
-others in each: the board's own classifier decides on fresh touches of the others, and of
-the four that it never met.
+others in each: the board's own classifier decides on fresh touches of the others, and
+of the four that it never met.
 """
 
 import tempfile
@@ -54,7 +54,7 @@ from train.data.feature_sets import expand
 from train.data.parts import part
 from train.fitting import fit
 from train.model.held_out import answers
-from train.model.novelty import beyond
+from train.model.outlier_score import beyond
 from train.model.rules import RISK
 from train.report.work import Workers
 from train.simulate import scene as scenes
@@ -165,7 +165,9 @@ def judged(drawn, labels):
     model = fitted.sequential
     new = drawn.pooled(POINTS_S, rest, fitted.dataset.names)
     hits, confidences, series = model.judged(new, y)
-    unknown = beyond(model.remoteness_.limits, model.space_.scores(new).remoteness)[-1]
+    unknown = beyond(
+        model.known_distance_.limits, model.space_.scores(new).known_distance
+    )[-1]
     certified = []
     fronts = []
     trusted = []

@@ -14,13 +14,13 @@ on touches that are not shifted. "1 of 20" says whether at most one of 20 sure a
 is wrong, or one in all, or why it cannot be seen. The reasons were measured on 140
 touches:
 
-- By an arm of half the stiffness, 30 of 32 things that were surely called fixed moved
+- By an arm of half the stiffness, 30 of 32 objects that were surely called fixed moved
   less than the scene's 20 mm, most of them 0. The label is that of the usual arm.
 - By an arm of twice the stiffness, the joints give way by 0.32 to 0.36 rad against a
-  fixed hedge, under a usual force. In training they did by 0.27 to 0.32 rad, and by more
-  for movable things alone.
-- The unmet things that are surely named are boxes and foam that are called "cardboard
-  box" and "foam block". Each is less remote than half of the touches of known things.
+  fixed hedge, under a usual force. In training they did by 0.27 to 0.32 rad, and by
+  more for movable objects alone.
+- The unmet objects that are surely named are boxes and foam that are called "cardboard
+  box" and "foam block". Each is less remote than half of the touches of known objects.
 """
 
 import tempfile
@@ -55,11 +55,11 @@ WORSE = 0.05
 """By so much the answers without a doubt may be worse than those on usual touches."""
 UNSURE = 0.5
 SURE = 0.95
-NEVER_MET = "things never met, so every name is wrong"
+NEVER_MET = "objects never met, so every name is wrong"
 UNSEEN = {
-    "arm stiffness x 0.5": "no: this arm leaves the things where they are",
-    "arm stiffness x 2": "no: foliage gives way to this arm as movable things did",
-    NEVER_MET: "no: some feel as things of their kind in training do",
+    "arm stiffness x 0.5": "no: this arm leaves the objects where they are",
+    "arm stiffness x 2": "no: foliage gives way to this arm as movable objects did",
+    NEVER_MET: "no: some feel as objects of their kind in training do",
 }
 """{shift: why nothing tells it}."""
 

@@ -1,4 +1,4 @@
-"""Limits of novelty, and certified errors."""
+"""Limits of the outlier score, and certified errors."""
 
 import mpmath
 import numpy as np
@@ -6,7 +6,7 @@ from hypothesis import strategies as st
 from mpmath import mpf
 
 from tests.checks.hard_cases.cases import SEEDS, Case, Ladder, decades, powers_of_ten
-from train.model.novelty import TAIL, UNUSUAL_RATE, limits_of
+from train.model.outlier_score import TAIL, UNUSUAL_RATE, limits_of
 from train.model.rules import upper_limit
 
 
@@ -53,7 +53,7 @@ def certified_error(trials, share):
 
 CASES = [
     Case(
-        "novelty's limits: scores that spread over many decades",
+        "the outlier score's limits: scores that spread over many decades",
         "mpmath, 50 digits",
         "error over the limit",
         limits_error,

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from train.model.novelty import CLIP, FARTHEST, STEP_BITS
+from train.model.outlier_score import CLIP, FARTHEST, STEP_BITS
 from train.model.projection import MOST_STEPS
 
 
@@ -121,8 +121,8 @@ def least_root(apart, nearness):
 
 
 def doubt(space, point, vectors):
-    """{name: (n,)} novelty and remoteness of vectors at a decision point, by the rule of
-    `train.model.novelty`."""
+    """{name: (n,)} the outlier score and the distance to known objects of vectors at a
+    decision point, by the rule of `train.model.outlier_score`."""
     at = space.points[point]
     steps = rounded((vectors - at.mean) * at.gain)
     steps = np.clip(steps, -int(CLIP * 2**STEP_BITS), int(CLIP * 2**STEP_BITS))
@@ -133,15 +133,18 @@ def doubt(space, point, vectors):
     places = np.clip(places, -int(FARTHEST), int(FARTHEST))
     rows = multiples(at.rows, 1.0)
     quarters = multiples(4.0 * at.weights, 1.0)
-    novelty = []
-    remoteness = []
+    outlier_score = []
+    known_distance = []
     for outside, place in zip(squares.tolist(), places, strict=True):
         apart = rows - place
         closest = least_root(apart, at.nearness)
-        novelty.append(float(Fraction(root(max(outside, 1))) * Fraction(closest)))
+        outlier_score.append(float(Fraction(root(max(outside, 1))) * Fraction(closest)))
         # With weights in quarters, the root is four times as long.
-        remoteness.append(least_root(apart * quarters, at.weighted_nearness) / 4.0)
-    return {"novelty": np.array(novelty), "remoteness": np.array(remoteness)}
+        known_distance.append(least_root(apart * quarters, at.weighted_nearness) / 4.0)
+    return {
+        "outlier_score": np.array(outlier_score),
+        "known_distance": np.array(known_distance),
+    }
 
 
 def outputs(fitted, X, y, vectors):

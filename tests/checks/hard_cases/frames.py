@@ -48,7 +48,7 @@ def flicker_error(seed):
 
 
 def clock_error(start):
-    """Largest error of a sample of force, area or motion, over the course's size.
+    """Largest error of a sample of force, area or motion, over the time series's size.
 
     Steps of 2^-7 s from a whole number of seconds are exact to 2^45 s; beyond, frames
     are to be refused or their times kept, never merged without a word.
@@ -57,7 +57,7 @@ def clock_error(start):
     frames = [
         Frame(begin + i / 128.0, np.zeros((16, 24), np.uint16)) for i in range(200)
     ]
-    courses = [[], [], []]
+    all_time_series = [[], [], []]
     pitch = Fraction(FOREARM.pitch_m[0])
     for i in range(11, 200):
         rows = 2 + i // 50
@@ -65,20 +65,22 @@ def clock_error(start):
         frames[i].counts[4 : 4 + rows, 5:8] = force
         # Each row below moves the centroid by half a row.
         moved = Fraction(rows - 2, 2) * pitch
-        for course, value in zip(courses, (force, 3 * rows, moved), strict=True):
-            course.append(Fraction(value))
+        for time_series, value in zip(
+            all_time_series, (force, 3 * rows, moved), strict=True
+        ):
+            time_series.append(Fraction(value))
     series = contact_of(frames, horizon_s=1.2).series()
     vector = feature_vector(series, 1.2).reshape(3, -1)
     worst = Fraction(0)
     times = np.linspace(0.0, 1.2, 40).tolist()
-    for samples, course in zip(vector.tolist(), courses, strict=True):
+    for samples, time_series in zip(vector.tolist(), all_time_series, strict=True):
         for sample, time in zip(samples, times, strict=True):
             place = Fraction(time) * 128
             whole = place.numerator // place.denominator
-            before = course[whole]
-            after = course[whole + 1]
+            before = time_series[whole]
+            after = time_series[whole + 1]
             true = before + (place - whole) * (after - before)
-            worst = max(worst, abs(Fraction(sample) - true) / max(course))
+            worst = max(worst, abs(Fraction(sample) - true) / max(time_series))
     return float(worst)
 
 
@@ -127,7 +129,7 @@ CASES = [
     Case(
         "features: contacts that begin late on the clock",
         "interpolation in fractions",
-        "error over the largest of a course",
+        "error over the largest of a time series",
         clock_error,
         [{"start": start} for start in (1.0, 1e5, 1.7e9)],
         {"start": powers_of_ten(0.0, 9.2)},

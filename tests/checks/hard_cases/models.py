@@ -49,7 +49,7 @@ def describe(fitted, info=None, samples=40):
             choice.scaling,
             0.0,
             features=choice.features,
-            factors=fitted.products_.get(task, {}),
+            factors=fitted.joint_tasks_.get(task, {}),
         )
         for task, choice in fitted.choices.items()
     }
@@ -61,7 +61,7 @@ def describe(fitted, info=None, samples=40):
         trials=(),
         decision_points_s=tuple(getattr(fitted, "decision_points_s", ())),
         stopping=getattr(fitted, "stopping_", {}),
-        novelty=getattr(fitted, "novelty_", None),
+        outlier_score=getattr(fitted, "outlier_score_", None),
     )
 
 

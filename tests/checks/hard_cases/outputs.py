@@ -1,4 +1,4 @@
-"""What follows from the outputs of a model with decision points and a product.
+"""What follows from the outputs of a model with decision points and a joint task.
 
 The oracle knows the fitted numbers of a model and the rules that the documentation
 states. It shares no code with the graph, with `train` or with `edge`: it computes in
@@ -30,12 +30,14 @@ CHOICES = {
     "object": Choice("none", 20, 4),
     "surface": Choice("III", 5, 7),
 }
-"""Of every number of neighbours that the graph treats in its own way: one, two, more."""
+"""Of every number of neighbours that the graph treats in its own way: one, two,
+more."""
 KINDS = ("contacts", "near-duplicates", "duplicates", "offset", "tiny")
 
 
 def labels_of(n):
-    """A product and its factors, objects, and surfaces that every third trial lacks."""
+    """A joint task and its factors, objects, and surfaces that every third trial
+    lacks."""
     rng = np.random.default_rng(2012)
     objects = rng.permutation(np.arange(n) % 12)
     mobility = np.array(["fixed", "movable"])[objects % 2]
@@ -63,7 +65,8 @@ def trials(n, kind):
 
 
 class Whole:
-    """A fitted model with decision points, its exported graph, and the oracle of the two.
+    """A fitted model with decision points, its exported graph, and the oracle of the
+    two.
 
     Args:
         n: training trials, a multiple of eight.
@@ -102,7 +105,7 @@ def whole(n, kind):
 
 
 def agreed(task, factors, distances):
-    """{task: label and distance of each label} of a product and its factors, for a
+    """{task: label and distance of each label} of a joint task and its factors, for a
     vector.
 
     The three distances of an answer are added one by one, and each sum is rounded once.
@@ -132,7 +135,7 @@ def agreement_error(kind, point, factor, seed):
     for row, vector in enumerate(vectors):
         distances = {t: outputs[f"{t}_label_distances"][row] for t in CHOICES}
         answers = {t: (int(outputs[f"{t}_label"][row]), distances[t]) for t in CHOICES}
-        for task, factors in subject.fitted.products_.items():
+        for task, factors in subject.fitted.joint_tasks_.items():
             answers |= agreed(task, factors, distances)
         for task, decision in subject.model.decide(vector, point).items():
             label, nearest = answers[task]
@@ -159,9 +162,9 @@ def confidence_error(kind, point, factor, seed):
             with mpmath.workdps(50):
                 far = [mpf(float(d)) for d in decision.label_distances]
                 rival = min(d for i, d in enumerate(far) if i != label)
-                typical = mpf(info.novelty.typical[point])
-                novelty = mpf(decision.novelty) / typical
-                excess = mpmath.log(novelty) if novelty > 1 else mpf(0)
+                typical = mpf(info.outlier_score.typical[point])
+                outlier_score = mpf(decision.outlier_score) / typical
+                excess = mpmath.log(outlier_score) if outlier_score > 1 else mpf(0)
                 terms = [
                     mpf(rule.slopes[point]) * (rival - far[label]),
                     mpf(rule.intercepts[point]),
@@ -169,8 +172,8 @@ def confidence_error(kind, point, factor, seed):
                 ]
                 log_odds = sum(terms)
                 true = 1 / (1 + mpmath.exp(-log_odds))
-                if rule.remoteness is not None:
-                    true *= rule.remoteness.known(point, decision.remoteness)
+                if rule.known_distance is not None:
+                    true *= rule.known_distance.known(point, decision.known_distance)
                 # An ulp of each term moves the probability by p (1 - p) of it.
                 resolved = 1 + true * (1 - true) * sum(map(abs, terms))
                 error = abs(mpf(decision.confidence) - true) / resolved
@@ -198,7 +201,7 @@ FARTHER = Ladder(
 
 CASES = [
     Case(
-        "outputs: a product and its factors agree; ties of votes",
+        "outputs: a joint task and its factors agree; ties of votes",
         "fractions, each sum rounded once",
         "decisions with another label, distance or tie",
         agreement_error,

@@ -60,7 +60,8 @@ def push_error(h, mu, steps=120):
     )
     trace = rig.run(steps)
     pushes = (
-        Trace(*(course[:, i : i + 1] for course in trace)) for i in range(mass.size)
+        Trace(*(time_series[:, i : i + 1] for time_series in trace))
+        for i in range(mass.size)
     )
     judged = zip(pushes, stiffness, mass, strict=True)
     return float(sum(bool(judge(push, k, m, mu, 0.8 * mu)) for push, k, m in judged))

@@ -1,4 +1,4 @@
-"""What asks for a look at a touch, and its course in a few numbers."""
+"""What asks for a look at a touch, and its time series in a few numbers."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -69,10 +69,10 @@ def test_a_course_is_in_percent_of_its_highest_and_misses_no_peak(make_touch):
     frames = np.zeros_like(touch.frames)
     frames[7, 2, 3] = 400
     frames[-1, 0, 0] = 100
-    course = review.curve(replace(touch, frames=frames))
-    assert len(course) == 32
-    assert max(course) == 100
-    assert course[-1] == 25
+    time_series = review.curve(replace(touch, frames=frames))
+    assert len(time_series) == 32
+    assert max(time_series) == 100
+    assert time_series[-1] == 25
     assert review.curve(replace(touch, frames=0 * frames)) == [0] * 32
 
 

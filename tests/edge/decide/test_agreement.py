@@ -5,7 +5,7 @@ import itertools
 import numpy as np
 import pytest
 
-from edge.decide.agreement import agreed, factors_fit, product_label
+from edge.decide.agreement import agreed, factors_fit, joint_label
 
 FACTORS = {"mobility": (0, 1, 0, 1), "softness": (0, 0, 1, 1)}
 SWAPPED = {"mobility": (0, 1, 0, 1), "softness": (1, 1, 0, 0)}
@@ -37,9 +37,9 @@ def test_the_answer_has_the_smallest_sum_of_all_that_agree():
         ]
 
 
-def test_two_labels_decided_apart_name_the_label_of_their_product():
-    assert product_label(FACTORS, {"mobility": 1, "softness": 0}) == 1
-    assert product_label(FACTORS, {"softness": 1, "mobility": 0}) == 2
+def test_two_labels_decided_apart_name_the_label_of_their_joint_task():
+    assert joint_label(FACTORS, {"mobility": 1, "softness": 0}) == 1
+    assert joint_label(FACTORS, {"softness": 1, "mobility": 0}) == 2
 
 
 @pytest.mark.parametrize(

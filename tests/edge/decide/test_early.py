@@ -1,4 +1,4 @@
-"""Policies of early decisions: a product is decided by its factors' decisions."""
+"""Policies of early decisions: a joint task is decided by its factors' decisions."""
 
 from types import SimpleNamespace
 
@@ -45,7 +45,7 @@ def factors(first, second, stops, confidences=(0.9, 0.8)):
 
 
 def answered(first, second, stops=("confidence",) * 2, rule=SURE):
-    """The product's answer once its factors have these."""
+    """The joint task's answer once its factors have these."""
     info = SimpleNamespace(tasks=TASKS, stopping={"category": None})
     policy = JointDecision(info, "category", rule, 0.1)
     return policy.answer(CANDIDATE, 1, factors(first, second, stops))
@@ -59,7 +59,7 @@ def test_a_task_that_is_not_certified_is_decided_at_the_last_point():
     assert "uncertified" in answer.flags
 
 
-def test_a_product_has_its_factors_labels_and_the_product_of_their_confidences():
+def test_a_joint_task_has_its_factors_labels_and_the_product_of_their_confidences():
     answer = answered("y", "b")
     assert answer.label == answer.decision.label == "y-b"
     assert answer.confidence == 0.72
@@ -68,7 +68,7 @@ def test_a_product_has_its_factors_labels_and_the_product_of_their_confidences()
 
 
 @pytest.mark.parametrize("confidence", [0.0, None])
-def test_a_factor_without_confidence_leaves_its_product_none(confidence):
+def test_a_factor_without_confidence_leaves_its_joint_task_none(confidence):
     decided = factors("y", "b", ("confidence",) * 2, (0.9, confidence))
     info = SimpleNamespace(tasks=TASKS)
     assert paired(info, CANDIDATE, decided).confidence == 0.0
@@ -82,7 +82,7 @@ def test_a_factor_without_confidence_leaves_its_product_none(confidence):
         (("window", "confidence"), "window"),
     ],
 )
-def test_a_product_is_sure_where_both_factors_are(stops, stopped_by):
+def test_a_joint_task_is_sure_where_both_factors_are(stops, stopped_by):
     answer = answered("y", "a", stops=stops)
     assert answer.stopped_by == stopped_by
     assert ("unsure" in answer.flags) == (stopped_by == "window")

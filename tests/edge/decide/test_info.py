@@ -9,8 +9,8 @@ import pytest
 
 from edge.config import ConfigTable
 from edge.decide.early import fastest, is_fixed, refusal, stopping_rules
-from edge.decide.info import Remoteness, Stopping, StoppingRule, margin
-from edge.decide.metadata_reader import read_remoteness, read_stopping
+from edge.decide.info import KnownDistance, Stopping, StoppingRule, margin
+from edge.decide.metadata_reader import read_known_distance, read_stopping
 from edge.decide.unusual import unusual
 from edge.errors import InputError
 
@@ -95,7 +95,7 @@ def test_where_the_full_window_errs_more_often_trials_do_not_help():
     assert "needs about" in refusal(stopping(wrong=0), 0.01)
 
 
-REMOTENESS = Remoteness(
+KNOWN_DISTANCE = KnownDistance(
     limits=(3.0, 4.0),
     middles=(math.e, 2.0),
     slopes=(1.0, 5.0),
@@ -114,12 +114,12 @@ def of_three(**changes):
 
 def of_two(**changes):
     """The limits of two."""
-    return read_remoteness(table(replace(REMOTENESS, **changes)), 2)
+    return read_known_distance(table(replace(KNOWN_DISTANCE, **changes)), 2)
 
 
 def test_what_is_stored_is_read_again():
     assert of_three() == stopping()
-    assert of_two() == REMOTENESS
+    assert of_two() == KNOWN_DISTANCE
 
 
 @pytest.mark.parametrize(
@@ -152,7 +152,7 @@ def test_what_contradicts_itself_is_refused(read, changes, says):
     [(0, 1.0, 1 / (1 + math.exp(-1))), (0, math.e, 0.5), (1, 2.0, 0.5), (0, 0.0, 1.0)],
 )
 def test_the_farther_a_thing_the_less_likely_it_is_known(point, score, known):
-    assert REMOTENESS.known(point, score) == pytest.approx(known)
+    assert KNOWN_DISTANCE.known(point, score) == pytest.approx(known)
 
 
 @pytest.mark.parametrize(

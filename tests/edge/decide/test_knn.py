@@ -1,4 +1,5 @@
-"""A decision has the same bits by whole numbers, estimators, ONNX Runtime, numpy and C."""
+"""A decision has the same bits by whole numbers, estimators, ONNX Runtime, numpy and
+C."""
 
 from typing import NamedTuple
 
@@ -6,14 +7,14 @@ import numpy as np
 import pytest
 from onnxruntime import GraphOptimizationLevel
 
-from edge.decide.info import Novelty
+from edge.decide.info import OutlierLimits
 from edge.decide.model import Model
 from export.graph import to_onnx
 from tests.checks.hard_cases import exact
 from tests.checks.hard_cases.models import describe, labels_for, session
 from tests.edge.decide.test_info import stopping
 from tests.export.microcontroller.comparison import assert_same, needs_gcc
-from train.model.novelty import NoveltySpace
+from train.model.outlier_score import OutlierSpace
 from train.model.pipeline import Choice, ContactClassifier, vote
 from train.model.scaling import SCALINGS
 from train.model.stopping import SequentialClassifier
@@ -168,9 +169,9 @@ def drawn(kind, count, seed):
         return Drawn(stack, y, fits[0], queries)
     fitted = SequentialClassifier(at_points[-1], POINTS_S)
     fitted.decision_points_ = fits
-    fitted.space_ = NoveltySpace.of(stack, y["t"], [SAMPLES] * 3)
+    fitted.space_ = OutlierSpace.of(stack, y["t"], [SAMPLES] * 3)
     fitted.stopping_ = dict.fromkeys(y, stopping())
-    fitted.novelty_ = Novelty((1.0,) * 3, (2.0,) * 3)
+    fitted.outlier_score_ = OutlierLimits((1.0,) * 3, (2.0,) * 3)
     return Drawn(stack, y, fitted, queries)
 
 

@@ -146,7 +146,7 @@ REFUSED = {
         lambda m: m["tasks"]["object"].update(
             factors={"category": [0, 0, 1, 1], "mobility": [0, 0, 0, 1]}
         )
-    ): "task 'object' is not the product of its factors",
+    ): "task 'object' is not the joint task of its factors",
     category(
         components=10**9
     ): "task 'category' has 1000000000 components of 120 features",

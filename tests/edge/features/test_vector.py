@@ -33,7 +33,7 @@ def series(t, peak, area=None, motion=None, scale=None, ended=False):
 
 
 def test_a_short_lift_off_is_bridged():
-    """What an arm does that bounces off a rigid thing tells nothing of the thing."""
+    """What an arm does that bounces off a rigid object tells nothing of the object."""
     t = np.arange(130) / 100
     held = feature_vector(series(t, [100] * 130, [4] * 130, 0.1 * t), 1.2)
     for first, length in [(30, 29), (110, 20)]:

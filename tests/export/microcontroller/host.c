@@ -56,8 +56,8 @@ static void give_outputs(void) {
     if (task->counts != EC_NOWHERE) give(a->label_distances, task->labels);
   }
   if (refused) return;
-  double scores[3] = {ec_scores_now.out_of_range, ec_scores_now.novelty, ec_scores_now.remoteness};
-  give(scores, EC_HAS_NOVELTY ? 3 : 1);
+  double scores[3] = {ec_scores_now.out_of_range, ec_scores_now.outlier_score, ec_scores_now.known_distance};
+  give(scores, EC_HAS_OUTLIERS ? 3 : 1);
 }
 
 static void give_vector(uint32_t point) {

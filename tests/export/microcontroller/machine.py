@@ -34,8 +34,8 @@ BOARDS = {
     ),
     "M33": ("cortex-m33", "", "mps2-an505", 0x10000000, 0x38000000),
 }
-"""{processor: its name for gcc, its options, QEMU's board, where code and RAM lie}. QEMU
-has no board with a Cortex-M0+ of enough memory; its code runs on a Cortex-M3."""
+"""{processor: its name for gcc, its options, QEMU's board, where code and RAM lie}.
+QEMU has no board with a Cortex-M0+ of enough memory; its code runs on a Cortex-M3."""
 LACKING = ("no_contact", "speed", "near_contact", "skin_motion")
 FLAGS = [flag for flag in ALL_FLAGS if flag not in LACKING]
 """In the order of their bits in C."""
@@ -118,7 +118,7 @@ def outputs(model, point, vector):
     refused = min(values[f"{task}_label"] for task in tasks) < 0
     ends = "label scores distances neighbours label_distances".split()
     names = [f"{task}_{end}" for task in tasks for end in ends[: 2 if refused else 5]]
-    names += [] if refused else ["out_of_range", "novelty", "remoteness"]
+    names += [] if refused else ["out_of_range", "outlier_score", "known_distance"]
     parts = [values[name].reshape(-1) for name in names if name in values]
     return np.concatenate(parts).astype(float)
 

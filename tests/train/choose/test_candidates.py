@@ -47,7 +47,7 @@ def test_columns_are_scaled_too_where_motions_of_joints_stand_beside_other_featu
 
 
 def sets_of(known=False, quick=False, **words):
-    """The feature sets that are candidates, for known things alone or for all."""
+    """The feature sets that are candidates, for known objects alone or for all."""
     every = candidates(TASKS, FitOptions(quick=quick), **words)
     return {c.sets for c in every if c.known == known}
 

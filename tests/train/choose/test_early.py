@@ -48,7 +48,7 @@ class TestSureDecisions:
         assert not decided.wrong[-1].any()
         assert (np.diff(decided.seconds, axis=0) >= 0.0).all()
 
-    def test_a_product_waits_for_the_later_factor_and_errs_where_either_does(self):
+    def test_a_joint_task_waits_for_the_later_factor_and_errs_where_either_does(self):
         decided = self.decisions("a", "b")
         assert decided.wrong[0].tolist() == [True, True]
         assert decided.seconds[-1].tolist() == [1.2, 1.2]

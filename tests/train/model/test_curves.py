@@ -57,13 +57,13 @@ def test_a_larger_margin_never_speaks_against_a_label():
     assert 0.0 < curve.slope < 1e-3
 
 
-def test_novelty_never_speaks_for_a_label():
+def test_an_outlier_score_never_speaks_for_a_label():
     excess = np.linspace(0.0, 1.0, 400)
     curve = fitted(np.zeros(400), excess, excess > 0.5)
     assert curve.doubt == LEAST_DOUBT
 
 
-def test_without_novel_trials_the_odds_fall_as_assumed():
+def test_without_unseen_trials_the_odds_fall_as_assumed():
     rng = np.random.default_rng(3)
     excess = np.full(50, 0.2)
     curve = fitted(rng.normal(size=50), excess, rng.random(50) < 0.8)

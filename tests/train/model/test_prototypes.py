@@ -17,7 +17,7 @@ CHOICES = {
 
 
 def touches(n):
-    """Vectors of four things, of which each lies at two places, and its place (n,)."""
+    """Vectors of four objects, of which each lies at two places, and its place (n,)."""
     X = features(n)
     thing = np.arange(n) % 4
     place = 2 * thing + np.arange(n) // 4 % 2
@@ -34,7 +34,7 @@ def parts(vectors, count):
 
 @pytest.fixture(scope="module")
 def model():
-    """A model with two prototypes of each thing, and its trials."""
+    """A model with two prototypes of each object, and its trials."""
     vectors, _ = touches(80)
     X = np.stack([vectors.X, vectors.X])
     folds = stratified_folds(vectors.y["thing"])

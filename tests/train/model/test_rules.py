@@ -49,7 +49,7 @@ SECONDS = np.array([0.4, 0.8, 1.2])
 
 
 def time_series(confidence, wrong):
-    """Of a task that is no product; no contact is unknown."""
+    """Of a task that is no joint task; no contact is unknown."""
     return TimeSeries([confidence], [wrong], np.zeros_like(wrong))
 
 
@@ -111,33 +111,33 @@ def test_a_task_is_wrong_where_it_names_nothing_when_it_is_decided():
     assert wrong.tolist() == [True, False]
 
 
-class TestProduct:
-    """Two factors and their product, which is decided when both are."""
+class TestJointTask:
+    """Two factors and their joint task, which is decided when both are."""
 
     SLOW = np.array([[0.2, 0.2], [0.2, 0.9], [0.2, 0.9]])
     FAST = np.full((3, 2), 0.9)
     WRONG = np.array([[True, True], [True, False], [False, False]])
 
-    def product(self):
+    def joint(self):
         right = np.zeros_like(self.WRONG)
         return TimeSeries(
             [self.FAST, self.SLOW], [right, self.WRONG], np.zeros_like(right)
         )
 
     def test_is_decided_with_the_later_factor_and_wrong_where_either_is(self):
-        at, wrong = self.product().under(StoppingRule(0.1, 1.0, 0.7, 2))
+        at, wrong = self.joint().under(StoppingRule(0.1, 1.0, 0.7, 2))
         assert at.tolist() == [2, 1]
         assert wrong.tolist() == [False, False]
-        at, wrong = self.product().under(StoppingRule(0.1, 1.0, NEVER, 0))
+        at, wrong = self.joint().under(StoppingRule(0.1, 1.0, NEVER, 0))
         assert at.tolist() == [0, 0]
         assert wrong.all()
 
     def agreeing(self, *rules):
-        """The rules of the product and of its fast factor."""
+        """The rules of the joint task and of its fast factor."""
         series = {
             "fast": time_series(self.FAST, np.zeros_like(self.WRONG)),
             "slow": time_series(self.SLOW, self.WRONG),
-            "product": self.product(),
+            "product": self.joint(),
         }
         factors = ("fast", "slow")
         by_task = agreeing("product", factors, {"product": rules}, series, SECONDS)
@@ -158,9 +158,9 @@ class TestProduct:
         self, rules, follows
     ):
         rules = [StoppingRule(*rule) for rule in rules]
-        product, factor = self.agreeing(*rules)
-        assert product == rules[:follows]
-        *before, last = product
+        joint, factor = self.agreeing(*rules)
+        assert joint == rules[:follows]
+        *before, last = joint
         assert factor == [self.WAITING, *before, replace(last, mean_s=0.4)]
 
 

@@ -1,12 +1,12 @@
-"""Calibrated confidences: logistic curves, folds, novelty, and the trials of each
-task."""
+"""Calibrated confidences: logistic curves, folds, the outlier score, and the trials of
+each task."""
 
 import numpy as np
 import pytest
 from scipy.special import logit
 
 from edge.decide.early import fastest
-from edge.decide.info import Novelty
+from edge.decide.info import OutlierLimits
 from edge.errors import InputError
 from train.data.folds import stratified_folds
 from train.model.held_out import answers
@@ -50,7 +50,7 @@ def test_what_is_plain_from_the_second_decision_point_on_is_decided_there():
 
 def test_an_excess_is_that_above_half_of_the_trials():
     scores = np.array([[1.0, 2.0, 2.0 * np.e, np.nan]])
-    excess = excess_of(Novelty((2.0,), (9.0,)), scores)
+    excess = excess_of(OutlierLimits((2.0,), (9.0,)), scores)
     assert excess[0].tolist() == pytest.approx([0.0, 0.0, 1.0, 0.0])
 
 
@@ -58,7 +58,7 @@ def test_rules_ask_for_the_same_margin_at_every_decision_point():
     X, labels = touches(60)
     model = calibrated(of_neighbours(3), X, {"t": labels})
     _, margins = answers(model.decision_points_, X)["t"]
-    excess = excess_of(model.novelty_, model.space_.scores(X).novelty)
+    excess = excess_of(model.outlier_score_, model.space_.scores(X).outlier_score)
     first, second, last = (at.tasks_["t"].slope for at in model.decision_points_)
     assert first == second != last
     *_, series = model.judged(X, {"t": labels})
@@ -83,7 +83,7 @@ def test_the_full_window_has_a_curve_of_its_own():
 
 
 def test_answers_to_groups_that_were_not_met_lower_the_confidence_at_the_full_window():
-    """Where a sixth of the things is left out, its trials are called wrongly."""
+    """Where a sixth of the objects is left out, its trials are called wrongly."""
     X, labels = touches(120)
     things = np.arange(120) % 6
     X[:, things == 3, 0] = np.where(labels[things == 3] == "a", 0.0, 30.0)
@@ -128,7 +128,7 @@ def test_trials_that_are_copies_set_no_limit():
     rows = [*range(60), *range(40)]
     copied = calibrated(of_neighbours(3), X[:, rows], {"t": labels[rows]})
     single = calibrated(of_neighbours(3), X, {"t": labels})
-    ratio = np.divide(copied.novelty_.typical, single.novelty_.typical)
+    ratio = np.divide(copied.outlier_score_.typical, single.outlier_score_.typical)
     assert ratio.min() > 0.3
     assert ratio.max() < 3.0
 
@@ -138,8 +138,8 @@ def test_an_unknown_thing_is_an_error_of_the_task_that_then_names_nothing():
     things = np.char.add(labels, np.where(X[1, :, 1] > 0, "+", "-"))
     choices = {"kind": Choice("none", 12, 1), "thing": Choice("none", 12, 1)}
     model = calibrated(choices, X, {"kind": labels, "thing": things})
-    assert model.stopping_["thing"].remoteness is not None
-    assert model.stopping_["kind"].remoteness is None
+    assert model.stopping_["thing"].known_distance is not None
+    assert model.stopping_["kind"].known_distance is None
     unknown = model.unknown_[-1]
     right = {task: answers[-1] for task, answers in model.right_.items()}
     assert 0 < (unknown & right["thing"]).sum() < 10
@@ -160,7 +160,7 @@ def test_what_no_task_takes_is_there_for_the_folds_alone():
     assert model.columns_.tolist() == list(range(6, 12))
     assert model.n_features_in_ == 6
     assert model.right_["t"][-1].all()
-    assert (model.space_.scores(X[..., model.columns_]).novelty == 0.0).all()
+    assert (model.space_.scores(X[..., model.columns_]).outlier_score == 0.0).all()
 
 
 def test_too_few_trials_are_refused():
@@ -180,5 +180,5 @@ def test_a_kind_is_no_name_though_it_has_more_labels():
     y["thing"] = np.where(np.arange(60) < 30, "cup", "box")
     choices = dict.fromkeys(y, Choice("none", 3, 1))
     stopping = calibrated(choices, X, y).stopping_
-    tasks = [task for task, of_task in stopping.items() if of_task.remoteness]
+    tasks = [task for task, of_task in stopping.items() if of_task.known_distance]
     assert tasks == ["thing"]

@@ -1,4 +1,4 @@
-"""The simulated arm, and rigid things that it pushes, held against answers that are
+"""The simulated arm, and rigid objects that it pushes, held against answers that are
 known."""
 
 import math

@@ -33,7 +33,7 @@ RANGES = {
     "slope_deg": [-10.0, 10.0],
     "width_m": [0.03, 0.3],
 }
-"""Values such that things slide, tip, turn, bounce and slip."""
+"""Values such that objects slide, tip, turn, bounce and slip."""
 OWN_RANGES = {
     "foam": {
         "modulus_pa": [1e3, 2e4],
@@ -137,7 +137,7 @@ class Ledger:
 
 
 def lean(t, mover):
-    """The energy stored in the lean of a thing that tips; beyond the balance it gives
+    """The energy stored in the lean of an object that tips; beyond the balance it gives
     it back."""
     if "tipping" not in t.states:
         return 0.0
@@ -203,6 +203,6 @@ def test_a_run_that_makes_energy_is_refused():
         joints = batch.joints.copy()
         joints[1, 100::every, 0] += turned
         with pytest.raises(
-            EdgeError, match=f"trial 1 of thing-fixed makes energy{when}"
+            EdgeError, match=f"trial 1 of object-fixed makes energy{when}"
         ):
             engine.check_energy(batch.trials, joints, batch.t)

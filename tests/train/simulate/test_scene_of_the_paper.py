@@ -60,7 +60,7 @@ def test_headline_accuracies_differ_from_the_papers_by_the_chance_of_both_sample
 @pytest.mark.slow
 def test_the_scenes_steps_cost_little_where_nothing_bounces(cody18):
     # Three kinds stand for all here; --explain measures each. The arm's inertia is
-    # left out: how things bounce is another at each step.
+    # left out: how objects bounce is another at each step.
     cody18 = replace(
         cody18, add=tuple(name for name in cody18.add if name != "inertia")
     )

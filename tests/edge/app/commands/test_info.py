@@ -21,15 +21,15 @@ def test_a_program_gets_the_metadata_with_size_and_time(edge):
 def test_the_doubt_about_names_says_what_it_is_worth():
     stopping = INFO.stopping["object"]
     worth = {"unknown": 0.46, "unsure": 0.21, "sure": 0.09, "known": 0.02}
-    measured = replace(stopping.remoteness, worth=worth)
-    (sentence,) = doubt({"object": replace(stopping, remoteness=measured)})
+    measured = replace(stopping.known_distance, worth=worth)
+    (sentence,) = doubt({"object": replace(stopping, known_distance=measured)})
     assert sentence == (
         "Of touches of each object that it has not met, 46% are called unknown, 21% are "
         "named with a confidence below 50 %, 9% with more than 90 %; of those that it "
         "knows 2% are called unknown."
     )
-    unmeasured = replace(stopping.remoteness, worth={})
-    (sentence,) = doubt({"object": replace(stopping, remoteness=unmeasured)})
+    unmeasured = replace(stopping.known_distance, worth={})
+    (sentence,) = doubt({"object": replace(stopping, known_distance=unmeasured)})
     assert "an unseen object is not known: too few were in training" in sentence
     assert [*doubt({})] == [UNDOUBTED]
 

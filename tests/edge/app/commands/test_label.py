@@ -12,7 +12,7 @@ from tests.edge.app.kept import kept_meta
 
 @pytest.fixture
 def folder(make_touch, tmp_path):
-    """Two hard things, the second with labels of its own for its contacts."""
+    """Two hard objects, the second with labels of its own for its contacts."""
     save(tmp_path / "a.npz", make_touch(seed=0))
     touch = make_touch(seed=1)
     contacts = [{"object": "hard 1"}, {"object": "hard 2"}]

@@ -4,17 +4,18 @@ Doubt has a space of its own, in which the choice of settings has no part: each 
 of the features is centred, divided by its standard deviation and cut off, and projected
 to principal components, which all decision points share. They are whitened by the
 spread within a label (Mahalanobis), or within a cluster of one where trials are many:
-centres that stand for trials show things that were never met as well as all trials do,
+centres that stand for trials show objects that were never met as well as all trials do,
 if what varies between the clusters of a label counts little.
 
 Two scores are taken there, of the distance to the nearest training trial over that at
 which this trial and its label have their own neighbours (as the local outlier factor of
-Breunig, Kriegel, Ng and Sander, 2000). Without the latter, most of the trained things
-that are flagged would be of the label that varies most. **Novelty** sees a changed body:
-it is this ratio times the length of what lies outside the components. **Remoteness**
-sees a thing that was never met: it is the ratio where directions that tell no labels
-apart count a quarter. The whitened axes are turned so that the discriminants of the
-labels come first (Fisher's, as the spread within labels is the same in all directions).
+Breunig, Kriegel, Ng and Sander, 2000). Without the latter, most of the trained objects
+that are flagged would be of the label that varies most. **The outlier score** sees a
+changed body: it is this ratio times the length of what lies outside the components.
+**The distance to known objects** sees an object that was never met: it is the ratio
+where directions that tell no labels apart count a quarter. The whitened axes are turned
+so that the discriminants of the labels come first (Fisher's, as the spread within
+labels is the same in all directions).
 
 The fits of the folds make the same number of components of their own trials. So the
 scores of their held-out trials tell how high those of new contacts with trained objects
@@ -45,7 +46,7 @@ from train.threads import in_processes, single_thread
 
 UNUSUAL_RATE = 0.01
 UNKNOWN_RATE = 0.0125
-"""Shares of contacts with trained things that may be flagged. Some have both flags, so
+"""Shares of contacts with trained objects that may be flagged. Some have both flags, so
 that a fiftieth has any."""
 BESIDE = 0.25
 """Weight of directions that tell no labels apart, a power of two."""
@@ -54,7 +55,8 @@ LEAST = 1e-3
 TAIL = 10
 """One of so many scores lies in their tail."""
 FOLDS = 20
-"""Folds of the held-out scores: more than a choice has, as a space of fewer trials finds
+"""Folds of the held-out scores: more than a choice has, as a space of fewer trials
+finds
 all others newer."""
 FOLDS_OF_MANY = 10
 """Where few rows stand for many trials, which a space of fewer trials has as well."""
@@ -65,7 +67,7 @@ LEAST_SHARE = 0.02
 """Least standard deviation of a column, as a share of its feature's."""
 MOVED_SHARE = 0.05
 """Least standard deviation of a joint's column that may tell of a changed body, where a
-scene drew the trained things, as a share of its feature's largest."""
+scene drew the trained objects, as a share of its feature's largest."""
 REMOUNT_RAD = math.radians(2.0)
 """By so much a joint's zero lies off once an arm was taken off and put on again."""
 MOST_CENTRES = 250
@@ -86,7 +88,7 @@ FARTHEST = 2.0**22
 
 
 @dataclass(frozen=True)
-class NoveltyPoint:
+class OutlierPoint:
     """The constants of a decision point.
 
     Attributes:
@@ -96,12 +98,13 @@ class NoveltyPoint:
         whitening: (components, components) whole numbers; a coordinate is the sum of
             products divided by 2^`shift`.
         shift: power of two.
-        rows: (n, components) whole coordinates of the training trials, or of the centres
-            of clusters of many.
-        weights: (components,) of coordinates in remoteness: 1 for discriminants, and
-            `BESIDE`.
+        rows: (n, components) whole coordinates of the training trials, or of the
+            centres of clusters of many.
+        weights: (components,) of coordinates in the distance to known objects: 1 for
+            discriminants, and `BESIDE`.
         nearness, weighted_nearness: (n,) by which squared distances to the rows are
-            multiplied for novelty, and with the weights for remoteness.
+            multiplied for the outlier score, and with the weights for the distance to
+            known objects.
     """
 
     mean: Floats
@@ -118,11 +121,11 @@ class Scores(NamedTuple):
     """How unlike all training trials vectors are.
 
     Attributes:
-        novelty, remoteness: (decision points, m).
+        outlier_score, known_distance: (decision points, m).
     """
 
-    novelty: Floats
-    remoteness: Floats
+    outlier_score: Floats
+    known_distance: Floats
 
     def part(self, trials: Booleans) -> Scores:
         """Those of some vectors, by a mask (m,)."""
@@ -130,7 +133,7 @@ class Scores(NamedTuple):
 
 
 @dataclass(frozen=True)
-class NoveltySpace:
+class OutlierSpace:
     """A space in which contacts are compared with all training trials.
 
     Attributes:
@@ -142,7 +145,7 @@ class NoveltySpace:
 
     weights: Floats
     shift: int
-    points: tuple[NoveltyPoint, ...]
+    points: tuple[OutlierPoint, ...]
 
     @classmethod
     def of(
@@ -152,7 +155,7 @@ class NoveltySpace:
         widths: Sequence[int],
         least: Floats | float = 0.0,
         trials: Booleans | slice = slice(None),
-    ) -> NoveltySpace:
+    ) -> OutlierSpace:
         """The space of some trials.
 
         Args:
@@ -186,15 +189,15 @@ class NoveltySpace:
         pairs = map(self._scores, self.points, X)
         return Scores(*map(np.stack, zip(*pairs, strict=True)))
 
-    def _scores(self, point: NoveltyPoint, x: Floats) -> tuple[Floats, Floats]:
+    def _scores(self, point: OutlierPoint, x: Floats) -> tuple[Floats, Floats]:
         steps = _steps(x, point.mean, point.gain)
         z = _product(steps, self.weights, self.shift)
         outside = np.maximum((steps**2).sum(axis=1) - (z**2).sum(axis=1), 1.0)
         y = _coordinates(z, point.whitening, point.shift)
         nearest = _nearest(y, point.rows, point.nearness)
         rows = point.rows * point.weights
-        remoteness = _nearest(y * point.weights, rows, point.weighted_nearness)
-        return np.sqrt(outside) * nearest, remoteness
+        known_distance = _nearest(y * point.weights, rows, point.weighted_nearness)
+        return np.sqrt(outside) * nearest, known_distance
 
 
 def _nearest(y: Floats, rows: Floats, nearness: Floats) -> Floats:
@@ -212,9 +215,10 @@ def least_deviations(vectors: Vectors, drawn: bool) -> Floats:
     p); infinite of those that tell of no changed body.
 
     Joints' angles lie off by `REMOUNT_RAD` once the arm was taken off and put on again.
-    A model of things that a scene drew is for arms of which it knows only the outlines.
-    So there a joint counts if it moves in the scene, by how far it has moved in the end:
-    its simulated course is smooth, and follows from the others to a thousandth of a
+    A model of objects that a scene drew is for arms of which it knows only the
+    outlines. So there a joint counts if it moves in the scene, by how far it has moved
+    in the end: its simulated time series is smooth, and follows from the others to a
+    thousandth of a
     radian.
     """
     least = np.zeros(vectors.X.shape[-1])
@@ -270,7 +274,8 @@ def _product(x: Floats, weights: Floats, shift: int) -> Floats:
 
 
 def _axes(steps: Iterable[Floats], count: int) -> Floats:
-    """(p, count) principal components of steps [(n, p)] around 0. Their scatter is a sum
+    """(p, count) principal components of steps [(n, p)] around 0. Their scatter is a
+    sum
     of whole numbers below 2^53."""
     scatter = reduce(np.add, (x.T @ x for x in steps))
     last = [len(scatter) - count, len(scatter) - 1]
@@ -297,7 +302,7 @@ def _coordinates(z: Floats, whitening: Floats, shift: int) -> Floats:
     return np.asarray(np.clip(integers, -FARTHEST, FARTHEST))
 
 
-def _point(mean: Floats, gain: Floats, z: Floats, labels: Strings) -> NoveltyPoint:
+def _point(mean: Floats, gain: Floats, z: Floats, labels: Strings) -> OutlierPoint:
     """The constants of a decision point at which trials have the components z."""
     names, classes = np.unique(labels, return_inverse=True)
     means = np.stack([z[classes == i].mean(axis=0) for i in range(len(names))])
@@ -319,7 +324,7 @@ def _point(mean: Floats, gain: Floats, z: Floats, labels: Strings) -> NoveltyPoi
     nearness = _nearness(_alone(y, rows, of_trials, labels), labels)
     alone = _alone(y * weights, rows * weights, of_trials, labels)
     weighted = _nearness(alone, labels)
-    return NoveltyPoint(mean, gain, integers, shift, rows, weights, nearness, weighted)
+    return OutlierPoint(mean, gain, integers, shift, rows, weights, nearness, weighted)
 
 
 def _centres(z: Floats, of_trials: Integers) -> Floats:
@@ -329,7 +334,8 @@ def _centres(z: Floats, of_trials: Integers) -> Floats:
 
 
 def _whitening(within: Floats, between: Floats) -> tuple[Floats, Floats]:
-    """A whitening (components, components), with its axes' weights in remoteness.
+    """A whitening (components, components), with its axes' weights in the distance to
+    known objects.
 
     Args:
         within: (n, components) deviations of trials from those that they are like.
@@ -353,8 +359,9 @@ def _turned(whitening: Floats, between: Floats) -> tuple[Floats, int]:
 
 
 def _alone(y: Floats, rows: Floats, of_trials: Integers, labels: Strings) -> Floats:
-    """(n,) the distance of each row to the nearest one of its label, or the mean distance
-    of the trials y whose centre it is, each to that of the others; infinite without any."""
+    """(n,) the distance of each row to the nearest one of its label, or the mean
+    distance of the trials y whose centre it is, each to that of the others; infinite
+    without any."""
     if len(rows) < len(y):
         away = np.sqrt(((y - rows[of_trials]) ** 2).sum(axis=1))
         others = np.bincount(of_trials) - 1
@@ -370,7 +377,8 @@ def _alone(y: Floats, rows: Floats, of_trials: Integers, labels: Strings) -> Flo
 
 
 def _nearness(alone: Floats, labels: Strings) -> Floats:
-    """(n,) one over the squared spacing of each row: half of how far it is `_alone`, and
+    """(n,) one over the squared spacing of each row: half of how far it is `_alone`,
+    and
     half the mean of this in its label."""
     classes = np.unique(labels, return_inverse=True)[1]
     has_others = np.isfinite(alone)
@@ -418,7 +426,7 @@ def _fold_scores(
     least: Floats | float,
 ) -> Scores:
     with single_thread():
-        space = NoveltySpace.of(X, labels, widths, least, ~left_out)
+        space = OutlierSpace.of(X, labels, widths, least, ~left_out)
         return space.scores(X[:, left_out])
 
 

@@ -1,4 +1,4 @@
-"""Novelty: a score in whole numbers, and limits that held-out trials set."""
+"""The outlier score: a score in whole numbers, and limits that held-out trials set."""
 
 import math
 
@@ -7,14 +7,14 @@ import pytest
 
 from train.data.folds import stratified_folds
 from train.data.vectors import Vectors
-from train.model import novelty
-from train.model.novelty import (
+from train.model import outlier_score
+from train.model.outlier_score import (
     CLIP,
     FARTHEST,
     LEAST,
     MOST_COMPONENTS,
     STEP_BITS,
-    NoveltySpace,
+    OutlierSpace,
     held_out_scores,
     least_deviations,
     limits_of,
@@ -35,7 +35,7 @@ def trials(n, seed=0, points=2):
 
 def test_no_whole_number_reaches_2_to_the_53():
     X, labels = trials(200)
-    space = NoveltySpace.of(X, labels, WIDTHS)
+    space = OutlierSpace.of(X, labels, WIDTHS)
     columns, components = space.weights.shape
     most = CLIP * 2.0**STEP_BITS
     assert columns * most**2 < 2.0**53
@@ -46,7 +46,7 @@ def test_no_whole_number_reaches_2_to_the_53():
         assert (np.linalg.norm(point.whitening, axis=0) * longest).max() < 2.0**53
         lengths = components * FARTHEST**2 + np.abs(point.rows).max() ** 2 * components
         assert 2.0 * lengths < 2.0**53
-        # In remoteness they are sixteenths.
+        # In the distance to known objects they are sixteenths.
         lengths = (point.weights**2).sum() * FARTHEST**2
         assert 2.0 * lengths * 16.0 < 2.0**53
 
@@ -54,7 +54,7 @@ def test_no_whole_number_reaches_2_to_the_53():
 def test_what_is_stored_fits_16_bits():
     X, labels = trials(60)
     X[0, 0] *= 1000.0
-    space = NoveltySpace.of(X, labels, WIDTHS)
+    space = OutlierSpace.of(X, labels, WIDTHS)
     assert 2**13 < np.abs(space.weights).max() < 2**15
     for point in space.points:
         assert 2**12 < np.abs(point.rows).max() < 2**14
@@ -64,7 +64,7 @@ def flagged(kind, new):
     """The shares of usual contacts, and of changed ones (2, m, 30), that lie beyond
     the limit of a score."""
     X, labels = trials(120)
-    space = NoveltySpace.of(X, labels, WIDTHS)
+    space = OutlierSpace.of(X, labels, WIDTHS)
     held_out = held_out_scores(X, labels, stratified_folds(labels), WIDTHS)
     _, limits = limits_of(getattr(held_out, kind), 0.02)
     usual, _ = trials(200, seed=9)
@@ -74,36 +74,36 @@ def flagged(kind, new):
     ]
 
 
-def test_a_shift_that_no_label_explains_is_novel():
+def test_a_shift_that_no_label_explains_is_an_outlier():
     new, _ = trials(200, seed=9)
     new[0, :, :5] += 1.0
-    usual, shifted = flagged("novelty", new)
+    usual, shifted = flagged("outlier_score", new)
     assert usual <= 0.06
     assert shifted > 0.9
 
 
-def test_a_thing_between_the_labels_is_remote():
+def test_an_object_between_the_labels_is_far_from_known_ones():
     """By what tells them apart."""
     new, _ = trials(200, seed=9)
     between = 0.5 * (new[:, 0::4] + new[:, 2::4])
-    usual, remote = flagged("remoteness", between)
+    usual, remote = flagged("known_distance", between)
     assert usual <= 0.06
-    assert remote > 3.0 * flagged("novelty", between)[1]
+    assert remote > 3.0 * flagged("outlier_score", between)[1]
 
 
 def test_discriminants_come_first_and_count_whole():
     X, labels = trials(60)
-    point = NoveltySpace.of(X, labels, WIDTHS).points[0]
+    point = OutlierSpace.of(X, labels, WIDTHS).points[0]
     assert point.weights.tolist() == [1.0] * 3 + [0.25] * 12
     means = np.stack([point.rows[labels == name].mean(axis=0) for name in "abcd"])
     spread = np.abs(means - means.mean(axis=0)).max(axis=0)
     assert spread[3:].max() < 0.01 * spread[0]
 
 
-def test_where_a_label_is_dense_a_contact_is_sooner_novel_and_remote():
+def test_where_a_label_is_dense_a_contact_is_sooner_an_outlier_and_unknown():
     X, labels = trials(60)
     X[:, labels == "a"] = X[:, :1] + 0.1 * (X[:, labels == "a"] - X[:, :1])
-    point = NoveltySpace.of(X, labels, WIDTHS).points[0]
+    point = OutlierSpace.of(X, labels, WIDTHS).points[0]
     for nearness in (point.nearness, point.weighted_nearness):
         assert nearness[labels == "a"].min() > 2.0 * np.median(nearness[labels != "a"])
 
@@ -111,9 +111,9 @@ def test_where_a_label_is_dense_a_contact_is_sooner_novel_and_remote():
 def test_units_of_a_feature_do_not_matter():
     X, labels = trials(60)
     new, _ = trials(30, seed=3)
-    scores = NoveltySpace.of(X, labels, WIDTHS).scores(new).novelty
+    scores = OutlierSpace.of(X, labels, WIDTHS).scores(new).outlier_score
     size = np.repeat([1.0, 2.0**40], WIDTHS)
-    scaled = NoveltySpace.of(X * size, labels, WIDTHS).scores(new * size).novelty
+    scaled = OutlierSpace.of(X * size, labels, WIDTHS).scores(new * size).outlier_score
     assert scaled == pytest.approx(scores, rel=1e-3)
 
 
@@ -121,7 +121,7 @@ def test_a_column_that_never_changed_counts_little_and_a_feature_not_at_all():
     X, labels = trials(60)
     X[..., 3] = 7.0
     X[..., 20:] = 0.25
-    space = NoveltySpace.of(X, labels, WIDTHS)
+    space = OutlierSpace.of(X, labels, WIDTHS)
     assert 0.0 < space.points[0].gain[3] < np.inf
     assert (space.points[0].gain[20:] == 0.0).all()
 
@@ -129,18 +129,25 @@ def test_a_column_that_never_changed_counts_little_and_a_feature_not_at_all():
 def test_of_a_drawn_scene_joints_count_by_how_far_those_that_move_have_moved():
     rng = np.random.default_rng(3)
     ways = rng.normal(size=(1, 40, 3)) * [1.0, 0.3, 0.01]
-    courses = ways[..., None] * np.linspace(0.1, 1.0, 10)
-    X = np.concatenate([rng.normal(size=(1, 40, 5)), courses.reshape(1, 40, 30)], -1)
+    all_time_series = ways[..., None] * np.linspace(0.1, 1.0, 10)
+    X = np.concatenate(
+        [rng.normal(size=(1, 40, 5)), all_time_series.reshape(1, 40, 30)], -1
+    )
     names = ("log_max_force@5", "joint_change@10")
     least = least_deviations(Vectors(X, {}, names, (5, 30)), drawn=True)
     assert np.flatnonzero(least == 0.0).tolist() == [0, 1, 2, 3, 4, 14, 24]
     labels = np.array(list("ab"))[np.arange(40) % 2]
-    space = NoveltySpace.of(X, labels, (5, 30), least)
+    space = OutlierSpace.of(X, labels, (5, 30), least)
     moved = X.copy()
     moved[..., 25:] += 1.0
-    assert space.scores(moved).novelty.tolist() == space.scores(X).novelty.tolist()
+    assert (
+        space.scores(moved).outlier_score.tolist()
+        == space.scores(X).outlier_score.tolist()
+    )
     moved[..., 14] += 5.0
-    assert (space.scores(moved).novelty > space.scores(X).novelty).mean() > 0.9
+    assert (
+        space.scores(moved).outlier_score > space.scores(X).outlier_score
+    ).mean() > 0.9
 
 
 def test_an_angle_may_lie_off_by_a_remount():
@@ -157,10 +164,15 @@ def test_held_out_scores_do_not_depend_on_the_held_out_trials():
     folds = stratified_folds(labels, 5)
     scores = held_out_scores(X, labels, folds, WIDTHS)
     training = folds != 2
-    alone = NoveltySpace.of(X[:, training], labels[training], WIDTHS)
+    alone = OutlierSpace.of(X[:, training], labels[training], WIDTHS)
     expected = alone.scores(X[:, ~training])
-    assert scores.part(~training).novelty.tolist() == expected.novelty.tolist()
-    assert scores.part(~training).remoteness.tolist() == expected.remoteness.tolist()
+    assert (
+        scores.part(~training).outlier_score.tolist() == expected.outlier_score.tolist()
+    )
+    assert (
+        scores.part(~training).known_distance.tolist()
+        == expected.known_distance.tolist()
+    )
 
 
 def test_a_new_score_of_any_small_set_lies_beyond_its_limit_as_often_as_asked():
@@ -178,29 +190,31 @@ def test_where_all_trials_are_copies_anything_else_is_beyond_the_limit():
 
 def test_few_trials_have_few_components():
     X, labels = trials(12)
-    assert NoveltySpace.of(X, labels, WIDTHS).weights.shape == (30, 4)
+    assert OutlierSpace.of(X, labels, WIDTHS).weights.shape == (30, 4)
     X, labels = trials(400)
-    assert NoveltySpace.of(X, labels, WIDTHS).weights.shape[1] <= MOST_COMPONENTS
+    assert OutlierSpace.of(X, labels, WIDTHS).weights.shape[1] <= MOST_COMPONENTS
 
 
 def test_of_many_trials_what_lies_between_the_poses_of_a_label_is_remote(monkeypatch):
-    monkeypatch.setattr(novelty, "MOST_ROWS", 20)
-    monkeypatch.setattr(novelty, "MOST_CENTRES", 24)
+    monkeypatch.setattr(outlier_score, "MOST_ROWS", 20)
+    monkeypatch.setattr(outlier_score, "MOST_CENTRES", 24)
     hidden = np.random.default_rng(0).normal(size=(2, 400, 6))
     labels = np.array(list("ab"))[np.arange(400) % 2]
     mixing = np.random.default_rng(1).normal(size=(6, 30))
     pose = np.where(np.arange(400) % 4 < 2, 10.0, -10.0)
     hidden[..., 0] += np.where(labels == "a", 0.0, 40.0) + pose
-    space = NoveltySpace.of((hidden @ mixing)[:, :200], labels[:200], WIDTHS)
+    space = OutlierSpace.of((hidden @ mixing)[:, :200], labels[:200], WIDTHS)
     known = hidden[:, 200:]
     between = known - [10.0, 0.0, 0.0, 0.0, 0.0, 0.0] * np.sign(pose[200:, None])
-    limits = np.quantile(space.scores(known @ mixing).remoteness, 0.99, axis=1)
-    medians = np.median(space.scores(between @ mixing).remoteness, axis=1)
+    limits = np.quantile(space.scores(known @ mixing).known_distance, 0.99, axis=1)
+    medians = np.median(space.scores(between @ mixing).known_distance, axis=1)
     assert (medians > 2.0 * limits).all()
 
 
 def test_a_trial_is_as_far_from_a_centre_as_if_it_had_no_part_in_it():
     y = np.array([[0.0], [2.0], [10.0], [16.0], [30.0]])
     rows = np.array([[1.0], [13.0], [30.0]])
-    alone = novelty._alone(y, rows, np.array([0, 0, 1, 1, 2]), np.array(list("aab")))
+    alone = outlier_score._alone(
+        y, rows, np.array([0, 0, 1, 1, 2]), np.array(list("aab"))
+    )
     assert alone.tolist() == [2.0, 6.0, np.inf]
