@@ -203,6 +203,6 @@ def test_a_run_that_makes_energy_is_refused():
         joints = batch.joints.copy()
         joints[1, 100::every, 0] += turned
         with pytest.raises(
-            EdgeError, match=f"trial 1 of object-fixed makes energy{when}"
+            EdgeError, match=f"trial 1 of thing-fixed makes energy{when}"
         ):
             engine.check_energy(batch.trials, joints, batch.t)

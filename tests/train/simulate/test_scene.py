@@ -81,7 +81,7 @@ MISTAKES = [
     (
         "object",
         GOOD["object"] * 2,
-        "object 'object': name must be different from every other",
+        "object 'thing': name must be different from every other",
     ),
     ("trials.lead_s", [0.1], "trials.lead_s must be one number or a range"),
     ("skin.cols", 2, "skin.cols must be a whole number from 3 to 1000, not 2"),
@@ -92,9 +92,9 @@ MISTAKES = [
     (
         "object.0.modulus_pa",
         1e4,
-        "object 'object': unknown key modulus_pa; allowed: name",
+        "object 'thing': unknown key modulus_pa; allowed: name",
     ),
-    ("object.0.base_m", 0.2, "object 'object': height_m is missing"),
+    ("object.0.base_m", 0.2, "object 'thing': height_m is missing"),
 ]
 
 
