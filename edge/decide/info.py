@@ -250,8 +250,7 @@ class ModelInfo:
     coarse sensors, so that this is no doubt."""
     onset: str = ""
     """What tells the onsets other than the skin, see `edge.touch.frame.ONSETS`; empty
-    where
-    the skin does."""
+    where the skin does."""
     scorer: str = "knn"
     """What gives the distances of labels, one of `edge.decide.engines.SCORERS`."""
     speeds: tuple[float, ...] = limited((), count=2)

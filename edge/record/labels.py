@@ -75,8 +75,7 @@ class JointTask:
 
     def contradiction(self, labels: Labels) -> str:
         """A sentence on a trial whose label of the joint task is another than that of
-        its
-        factors; empty elsewhere."""
+        its factors; empty elsewhere."""
         implied = self.label(self.completed(labels))
         label = labels.get(self.task, implied)
         if implied is None or label == implied:

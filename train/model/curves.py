@@ -42,8 +42,7 @@ class Curve:
     """The probability that a label is right.
 
     It is the logistic function of slope * margin + intercept - doubt * excess, where
-    the
-    excess is the part of the outlier score above that of half of the trials
+    the excess is the part of the outlier score above that of half of the trials
     (`excess_of`).
     """
 

@@ -275,8 +275,7 @@ def _product(x: Floats, weights: Floats, shift: int) -> Floats:
 
 def _axes(steps: Iterable[Floats], count: int) -> Floats:
     """(p, count) principal components of steps [(n, p)] around 0. Their scatter is a
-    sum
-    of whole numbers below 2^53."""
+    sum of whole numbers below 2^53."""
     scatter = reduce(np.add, (x.T @ x for x in steps))
     last = [len(scatter) - count, len(scatter) - 1]
     return np.asarray(eigh(scatter, subset_by_index=last)[1])
@@ -378,8 +377,7 @@ def _alone(y: Floats, rows: Floats, of_trials: Integers, labels: Strings) -> Flo
 
 def _nearness(alone: Floats, labels: Strings) -> Floats:
     """(n,) one over the squared spacing of each row: half of how far it is `_alone`,
-    and
-    half the mean of this in its label."""
+    and half the mean of this in its label."""
     classes = np.unique(labels, return_inverse=True)[1]
     has_others = np.isfinite(alone)
     usual = float(alone[has_others].mean()) if has_others.any() else 1.0
