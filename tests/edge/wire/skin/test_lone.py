@@ -111,3 +111,14 @@ def test_it_has_five_living_neighbours_as_a_pad_of_a_glove_is_touched_alone(
 @pytest.mark.parametrize(("wraps", "frames"), [(True, []), (False, [5])])
 def test_a_neighbour_beyond_the_seam_is_beside_it(wraps, frames):
     assert changes("B" * 6, (4, 6), (2, 0), wraps=wraps) == frames
+
+
+def test_the_start_of_a_skin_is_its_first_frame_whatever_the_clock_says():
+    taxels = LoneTaxels(8, 8, wraps=False)
+    counts = np.zeros((8, 8), np.uint16)
+    counts[3, 3] = 500
+    broken = []
+    for eighth in range(8):
+        taxels.follow(counts, 40, counts < 501, 100.0 + eighth / 8)
+        broken.append(taxels.broken[3, 3])
+    assert broken == [False] * 4 + [True] * 4

@@ -107,6 +107,15 @@ def test_a_bus_is_named_by_its_number(number):
     assert not bus.serial
 
 
+@pytest.mark.parametrize(("rows", "is_too_large"), [(40, False), (41, True)])
+def test_a_chip_serves_at_most_so_many_taxels(rows, is_too_large):
+    text = one_chip(rows, 100, bus='serial = "/dev/ttyACM0"', at="")
+    if is_too_large:
+        assert "names 4100 taxels" in mistake(text)
+    else:
+        assert len(skinfile.parse(text).served) == 4000
+
+
 def test_a_microcontroller_may_stand_on_a_serial_port_and_serve_a_single_taxel():
     (bus,) = skinfile.parse(SERIAL.replace("[2, 3] }", "[1, 1] }")).buses
     assert bus.device == "/dev/ttyACM0"
