@@ -225,6 +225,7 @@ def changes(skin, seconds):
 def test_the_user_hears_of_a_chip_that_fails_and_comes_back():
     lost = Fault(bus=SMALL.buses[1].device, channel=1, address=0x2D, during=(0.1, 0.2))
     with faulty_skin(SMALL, lambda t: QUIET, faults=[lost]) as skin:
+        skin.readers[1].bus.reopen = pytest.fail  # the bus's other chips run
         (failed_at, down), (back_at, up) = changes(skin, 0.7)
     assert failed_at == 0.1
     assert down.state == "down"

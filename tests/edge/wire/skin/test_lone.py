@@ -122,3 +122,13 @@ def test_the_start_of_a_skin_is_its_first_frame_whatever_the_clock_says():
         taxels.follow(counts, 40, counts < 501, 100.0 + eighth / 8)
         broken.append(taxels.broken[3, 3])
     assert broken == [False] * 4 + [True] * 4
+
+
+@pytest.mark.parametrize(("columns", "is_broken"), [([7], True), ([0, 7], False)])
+def test_the_last_column_of_a_skin_that_wraps_is_beside_the_first(columns, is_broken):
+    taxels = LoneTaxels(8, 8, wraps=True)
+    counts = np.zeros((8, 8), np.uint16)
+    counts[3, columns] = 500
+    for eighth in range(8):
+        taxels.follow(counts, 40, counts < 501, eighth / 8)
+    assert taxels.broken[3, 7] == is_broken
