@@ -58,35 +58,48 @@ class Formula:
         self._spaces = 1 + max(map(at.space, tasks))
         self.trials = max(len(at.numbers(f"labels of {t}", 1)) for t in tasks)
         projections = [
-            made for point in points for made in self._projections(self._points[point])
+            projection
+            for point in points
+            for projection in self._projections(self._points[point])
         ]
         of_tasks = [self._task(name, rules.get(name)) for name in tasks]
-        # Of a space the rows with most components come first: others are parts of them.
-        wide = sorted(tasks, key=lambda name: -tasks[name].components)
-        places = {
-            (point, name): self._place(name, point) for point in points for name in wide
-        }
+        places = self._places(points)
         self.naming = self._naming() if has_outliers else NOWHERE
         doubts = [self._doubt(point) for point in points] if has_outliers else []
         self.tables = {
             "projections": projections,
             "tasks": of_tasks,
-            "places": [places[point, name] for point in points for name in tasks],
+            "places": places,
             "doubts": doubts,
         }
-        near = [f"counts of {name}" for name in tasks if f"scales of {name}" in at]
         projected = [*projections, *(doubt["projection"] for doubt in doubts)]
+        self.sizes = {**self._sizes(projected), "has_outliers": has_outliers}
+
+    def _sizes(self, projections: Sequence[Array]) -> dict[str, int]:
+        """The fields of the `ec_sizes` that tasks and projections need."""
+        at = self._last
+        tasks = self._info.tasks
+        near = [f"counts of {name}" for name in tasks if f"scales of {name}" in at]
         widths = [len(at.numbers(f"coordinates of {name}", 2)) for name in tasks]
-        widths += [int(projection["components"][0]) for projection in projected]
-        self.sizes = {
+        widths += [int(projection["components"][0]) for projection in projections]
+        return {
             "tasks": len(tasks),
             "labels": max(len(task.labels) for task in tasks.values()),
             "neighbours": max(task.k for task in tasks.values()),
             "nearest": max((int(at.numbers(n, 1).sum()) for n in near), default=0),
             "components": max(widths),
             "spaces": self._spaces,
-            "has_outliers": has_outliers,
         }
+
+    def _places(self, points: Sequence[int]) -> list[Array]:
+        """The `ec_place` of each task at each decision point."""
+        tasks = self._info.tasks
+        # Of a space the rows with most components come first: others are parts of them.
+        wide = sorted(tasks, key=lambda name: -tasks[name].components)
+        places = {
+            (point, name): self._place(name, point) for point in points for name in wide
+        }
+        return [places[point, name] for point in points for name in tasks]
 
     def _projections(self, at: Constants) -> list[Array]:
         """The `ec_projection` of each space at a decision point."""

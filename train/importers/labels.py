@@ -235,16 +235,15 @@ def _by_name(places: Sequence[Place], task: str) -> Labels:
 
 
 def _name(place: Place, counting: set[str], has_id: bool) -> tuple[str, str]:
-    """The label that a name tells, or an empty one, and which part of the name that
-    is."""
+    """The label that a name tells, or an empty one, and the part of the name that
+    tells it."""
     folders = [part for part in place.path.parts[:-1] if part not in counting]
     if folders:
         return folders[-1], "the folder's name"
     if has_id:
         return place.stem.partition(".")[0], "the file's name before the first dot"
-    return re.sub(
-        COUNT, "", place.stem
-    ), "the file's name without the number at its end"
+    name = re.sub(COUNT, "", place.stem)
+    return name, "the file's name without the number at its end"
 
 
 def _counting(paths: Sequence[Path]) -> set[str]:

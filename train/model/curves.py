@@ -30,8 +30,7 @@ LEAST_DOUBT = 0.5
 WITHHELD = 0.5
 """Part of the mean confidence that doubt about the object takes from known objects, and
 that is not given back. With all of it given back, objects that were never met are
-surely
-named; with none, known objects are called too doubtful (docs/measured.md)."""
+surely named; with none, known objects are called too doubtful (docs/measured.md)."""
 LEAST_SLOPE = 1e-3
 """Smallest slope a standard deviation: a larger margin never makes a label less
 likely."""

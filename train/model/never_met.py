@@ -19,12 +19,11 @@ from edge.elementary import log
 from train.data.folds import group_folds
 from train.data.vectors import Strings
 from train.model.curves import board_logistic
-from train.model.outlier_score import LEAST, UNKNOWN_RATE, limits_of
+from train.model.limits import LEAST, UNKNOWN_RATE, limits_of
 
 SHARE = 0.1
 """Share of contacts with objects that were never met. With a larger one, doubt about
-the
-object says less of which names of known objects are right (docs/measured.md)."""
+the object says less of which names of known objects are right (docs/measured.md)."""
 FEWEST_OBJECTS = 5
 """Where there are fewer, what remains of a fold says little of the model."""
 MOST_FOLDS = 10

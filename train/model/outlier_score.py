@@ -44,20 +44,11 @@ from train.data.vectors import MOST_ROWS, Strings, Vectors, blocks
 from train.model.prototypes import clusters
 from train.threads import in_processes, single_thread
 
-UNUSUAL_RATE = 0.01
-UNKNOWN_RATE = 0.0125
-"""Shares of contacts with trained objects that may be flagged. Some have both flags, so
-that a fiftieth has any."""
 BESIDE = 0.25
 """Weight of directions that tell no labels apart, a power of two."""
-LEAST = 1e-3
-"""Scores below this, as of copies, count as much."""
-TAIL = 10
-"""One of so many scores lies in their tail."""
 FOLDS = 20
-"""Folds of the held-out scores: more than a choice has, as a space of fewer trials
-finds
-all others newer."""
+"""Folds of the held-out scores: more than a choice has, as a space of fewer
+trials finds all others newer."""
 FOLDS_OF_MANY = 10
 """Where few rows stand for many trials, which a space of fewer trials has as well."""
 MOST_COMPONENTS = 40
@@ -426,35 +417,3 @@ def _fold_scores(
     with single_thread():
         space = OutlierSpace.of(X, labels, widths, least, ~left_out)
         return space.scores(X[:, left_out])
-
-
-def limits_of(scores: Floats, rate: float) -> tuple[tuple[float, ...], ...]:
-    """(decision points,) typical scores, which half exceed, and the limits that a share
-    `rate` of contacts exceeds.
-
-    Few scores lie beyond a tenth. So the tail of the logarithm is taken for
-    exponential, with the mean excess over that tenth. A mean of few is itself a guess:
-    the limit is that of the next score, given these (its excess is Lomax, with their
-    number as its shape), so that the share is right over many sets of trials. Of a
-    rarer share than one of them few trials say nothing, so it is at least that.
-
-    Args:
-        scores: (decision points, n) of held-out trials.
-        rate: at most a tenth.
-    """
-    logs = np.sort(np.log(np.maximum(scores, LEAST)), axis=1)
-    trials = logs.shape[1]
-    count = math.ceil(trials / TAIL)
-    tails = logs[:, -count - 1]
-    excess = logs[:, -count:].mean(axis=1) - tails
-    share = (count + 1) / (trials + 1)
-    least = max(rate, 1.0 / (trials + 1))
-    reach = count * ((share / least) ** (1.0 / count) - 1.0)
-    limits = np.exp(tails + excess * reach).tolist()
-    typical = np.exp(np.median(logs, axis=1)).tolist()
-    return tuple(typical), tuple(limits)
-
-
-def beyond(limits: Sequence[float], scores: Floats) -> Booleans:
-    """(decision points, m) whether scores lie beyond the limits of their points."""
-    return np.asarray(scores > np.array(limits)[:, None])

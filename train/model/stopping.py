@@ -52,6 +52,7 @@ from train.model.held_out import (
     held_out,
     slopes_at_points,
 )
+from train.model.limits import UNUSUAL_RATE, beyond, limits_of
 from train.model.never_met import (
     SHARE,
     known_distance_of,
@@ -62,13 +63,10 @@ from train.model.never_met import (
 from train.model.outlier_score import (
     FOLDS,
     FOLDS_OF_MANY,
-    UNUSUAL_RATE,
     OutlierSpace,
     Scores,
-    beyond,
     held_out_scores,
     least_deviations,
-    limits_of,
 )
 from train.model.pipeline import Choices, Fits
 from train.model.prototypes import divided

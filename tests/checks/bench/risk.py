@@ -54,7 +54,7 @@ from train.data.feature_sets import expand
 from train.data.parts import part
 from train.fitting import fit
 from train.model.held_out import answers
-from train.model.outlier_score import beyond
+from train.model.limits import beyond
 from train.model.rules import RISK
 from train.report.work import Workers
 from train.simulate import scene as scenes

@@ -6,7 +6,7 @@ from hypothesis import strategies as st
 from mpmath import mpf
 
 from tests.checks.hard_cases.cases import SEEDS, Case, Ladder, decades, powers_of_ten
-from train.model.outlier_score import TAIL, UNUSUAL_RATE, limits_of
+from train.model.limits import TAIL, UNUSUAL_RATE, limits_of
 from train.model.rules import upper_limit
 
 

@@ -8,16 +8,15 @@ import pytest
 from train.data.folds import stratified_folds
 from train.data.vectors import Vectors
 from train.model import outlier_score
+from train.model.limits import LEAST, limits_of
 from train.model.outlier_score import (
     CLIP,
     FARTHEST,
-    LEAST,
     MOST_COMPONENTS,
     STEP_BITS,
     OutlierSpace,
     held_out_scores,
     least_deviations,
-    limits_of,
 )
 
 WIDTHS = (20, 10)
