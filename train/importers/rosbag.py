@@ -15,6 +15,7 @@ from edge.errors import InputError
 from edge.files import open_regular, parsing
 from edge.touch.arm import Chain
 from train.importers import ImportedTrial
+from train.importers.forms import unread
 from train.importers.options import LogOptions
 from train.importers.table import needs
 from train.importers.topics import Log
@@ -40,8 +41,7 @@ def trials(
     with needs("rosbags", "this"):
         from rosbags.highlevel import AnyReader
         from rosbags.typesys import Stores, get_typestore
-    if not path.is_dir():
-        _require_messages_of_ros(path)
+    _require_bag(path)
     log = Log(path, arm, LogOptions.of(arguments))
     # ROS 2 bags from before 2024 do not contain the definitions of their types.
     types = get_typestore(Stores.ROS2_HUMBLE)
@@ -56,6 +56,26 @@ def trials(
             message = reader.deserialize(raw, connection.msgtype)
             log.add(connection.topic, connection.msgtype, message, logged_ns * 1e-9)
     yield ImportedTrial(path.stem, log.recording())
+
+
+def _require_bag(path: Path) -> None:
+    """Refuse what is no bag by its name.
+
+    Raises:
+        InputError: it is none, or its messages are not those of ROS 2.
+    """
+    bags = unread.UNREAD[unread.LOG]
+    if path.is_dir():
+        is_bag = (path / "metadata.yaml").exists()
+    else:
+        is_bag = path.suffix in bags
+    if not is_bag:
+        raise InputError(
+            f"{path}: is no bag, which is a file {', '.join(bags)} or a folder with "
+            "metadata.yaml; `import csv` reads tables"
+        )
+    if not path.is_dir():
+        _require_messages_of_ros(path)
 
 
 def _require_messages_of_ros(path: Path) -> None:

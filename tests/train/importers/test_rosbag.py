@@ -272,6 +272,8 @@ def test_joints_that_do_not_suit_the_arm(bag, arm, refused, names, sentence):
         ("a.mcap", b"\x89MCAP0\r\n", "a.mcap: not a readable bag"),
         ("a.bag", b"hello", "a.bag: not a readable bag"),
         ("no", None, "no: no such file or folder"),
+        ("a.csv", b"1,2", "a.csv: is no bag"),
+        (".", None, "is no bag"),
     ],
 )
 def test_what_is_no_log_is_one_sentence(tmp_path, refused, name, contents, sentence):
