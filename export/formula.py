@@ -235,7 +235,7 @@ class Formula:
         counts = NOWHERE
         if f"scales of {name}" in at:
             counts = add("words", at.numbers(f"counts of {name}", 1))
-        made = record(
+        of_task = record(
             "ec_task",
             text=self._pools.text(name, *task.labels),
             trials=add("words", np.where(labels < 0, NO_LABEL, labels)),
@@ -248,12 +248,12 @@ class Formula:
         )
         stopping = self._info.stopping.get(name)
         if stopping is not None:
-            made["rule_curve"] = stopping.slope, stopping.intercept, stopping.doubt
+            of_task["rule_curve"] = stopping.slope, stopping.intercept, stopping.doubt
         if rule:
-            made["rule_confidence"] = rule.confidence
-            made["rule_last"] = rule.last
-            made["has_rule"] = True
-        return made
+            of_task["rule_confidence"] = rule.confidence
+            of_task["rule_last"] = rule.last
+            of_task["has_rule"] = True
+        return of_task
 
 
 def _shared(tables: list[tuple[Floats, Array]], wide: Floats, mine: Array) -> int:

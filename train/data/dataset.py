@@ -194,7 +194,7 @@ class DataSet:
                     trial.series, window_s, samples, missing, self.kernels
                 )
             columns = np.split(table, np.cumsum(sizes)[:-1], axis=1)
-            # The trials stay with what is known of them, so that no others get their id.
+            # The trials stay beside their facts, so that no others get their id.
             for name, of_name in zip(missing, columns, strict=True):
                 tables[keys[name]] = self.trials, of_name
         return np.concatenate([tables[keys[name]][1] for name in names], axis=1)
