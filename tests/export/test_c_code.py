@@ -19,7 +19,7 @@ from edge.decide.info import OutlierLimits, margin
 from edge.decide.model import Model
 from edge.elementary import logistic
 from edge.errors import InputError
-from edge.features.kernels import KernelTable, channels_of
+from edge.features.kernels import BITS, KernelTable, channels_of
 from edge.features.names import feature
 from edge.features.names import names as all_names
 from edge.features.quantities import KERNELS, OF_ZONES, Quantity
@@ -315,7 +315,9 @@ def test_every_feature_of_damaged_recordings_has_the_same_bits(
     tables = {}
     for name, biases in KERNELS.items():
         shifts = rng.integers(-20, 3, channels_of(name, layout)).tolist()
-        limits = rng.integers(-30, 99, biases).tolist()
+        small = rng.integers(-30, 99, biases)
+        of_cut_off = rng.integers(-12, 13, biases) * (2**BITS - 1)
+        limits = np.where(rng.random(biases) < 0.5, small, of_cut_off - 1).tolist()
         tables[name] = KernelTable(tuple(shifts), tuple(limits))
     model = measuring(
         layout,

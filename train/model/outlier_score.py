@@ -36,6 +36,7 @@ from typing import NamedTuple
 import numpy as np
 from joblib import delayed
 from scipy.linalg import eigh
+from scipy.sparse.linalg import ArpackError, eigsh
 from scipy.spatial.distance import cdist
 
 from edge.arrays import Booleans, Floats, Integers
@@ -74,6 +75,8 @@ SHRINKAGE = 0.03
 STORED_BITS = 15
 """Weights and training rows are whole numbers below 2^`STORED_BITS`."""
 WHITENING_BITS = 24
+FULL_RANK = 1e-9
+"""Least share of the largest eigenvalue from which on one is no rounding."""
 FARTHEST = 2.0**22
 """Coordinates are cut off here, so that squared distances stay below 2^53."""
 
@@ -267,17 +270,32 @@ def _product(x: Floats, weights: Floats, shift: int) -> Floats:
 def _axes(steps: Iterable[Floats], count: int) -> Floats:
     """(p, count) principal components of steps [(n, p)] around 0. Their scatter is a
     sum of whole numbers below 2^53."""
-    scatter = reduce(np.add, (x.T @ x for x in steps))
-    last = [len(scatter) - count, len(scatter) - 1]
-    return np.asarray(eigh(scatter, subset_by_index=last)[1])
+    return _leading(reduce(np.add, (x.T @ x for x in steps)), count)[1]
 
 
 def _axes_of_few(steps: Iterable[Floats], count: int) -> Floats:
     """`_axes` of fewer rows than columns."""
     rows = np.concatenate(list(steps))
-    last = [len(rows) - min(count, len(rows)), len(rows) - 1]
-    values, vectors = eigh(rows @ rows.T, subset_by_index=last)
+    values, vectors = _leading(rows @ rows.T, min(count, len(rows)))
     return np.asarray(rows.T @ vectors / np.sqrt(np.maximum(values, 1.0)))
+
+
+def _leading(scatter: Floats, count: int) -> tuple[Floats, Floats]:
+    """The largest eigenvalues (count,) of a scatter (n, n), rising, and their vectors
+    (n, count).
+
+    Lanczos' method takes a quarter of the time, but where the scatter has no more than
+    these it goes on from random vectors.
+    """
+    n = len(scatter)
+    if 2 * count < n:
+        try:
+            values, vectors = eigsh(scatter, count, which="LA", v0=np.ones(n))
+        except ArpackError:
+            values = np.zeros(count)
+        if values[0] > FULL_RANK * values[-1]:
+            return values, vectors
+    return eigh(scatter, subset_by_index=[n - count, n - 1])
 
 
 def _shift(values: Floats, bits: int) -> int:

@@ -59,8 +59,8 @@ def recordings_for(layout, count, rng):
 def on_the_edges(layout):
     """Contacts that stand on the edge of a comparison, from 0 s on."""
     count = layout.onset + 100
-    frames = np.zeros((8, 140, *layout.shape), np.uint16)
-    t = np.tile(np.arange(140) / 100, (8, 1))
+    frames = np.zeros((9, 140, *layout.shape), np.uint16)
+    t = np.tile(np.arange(140) / 100, (9, 1))
     frames[0, :10, 2, 1] = layout.onset
     frames[0, 10:, 2, 1] = layout.onset + 1
     frames[1, :, 1, 1] = frames[1, :, 5, 3] = count  # equal regions
@@ -75,6 +75,7 @@ def on_the_edges(layout):
     frames[[1, 6], 20] = 0  # as it is released
     t[6, 20:] += layout.release_s - 0.01 - 5e-7
     t[7, 1:] = np.arange(1, 140) * 0.6 / 39 + 5e-7  # as kernels are taken
+    t[8, 1:] += 0.04  # a step as long as it may be without a flag
     joints = np.linspace(0, [2e5, -3e4, 1, 2, 3], 141)
     # The frame before says that the touch was not under way.
     t = np.insert(t, 0, -0.01, axis=1)
