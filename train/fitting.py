@@ -153,7 +153,7 @@ def load(
     skipped = (f"warning: {error}; it is left out" for error in readable.damaged)
     notes = [*skipped, *notes]
     if options.fixed_window_s is None and not options.quick:
-        seconds = [float(r.t[-1] - r.t[0]) for r in recordings.recordings]
+        seconds = [float(r.t[-1] - r.t[0]) for r in recordings.each()]
         windows = windows_of(seconds)
     loaded = trials_of(recordings, windows, options)
     taxels = BrokenTaxels()

@@ -221,10 +221,13 @@ class DataSet:
         interval.
         """
         step = -(-len(self.trials) // MOST_TOUCHES)
-        felt = [trial.series.felt(window_s) for trial in self.trials[::step]]
+        trials = self.trials[::step]
         tables = {
             name: kernel_table(
-                [kernel_channels(series, window_s, name) for series in felt],
+                [
+                    kernel_channels(trial.series.felt(window_s), window_s, name)
+                    for trial in self.scratch.each(trials)
+                ],
                 KERNELS[name],
                 alike=name == "taxel_kernels",
             )

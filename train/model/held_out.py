@@ -84,7 +84,7 @@ def held_out(
     slopes = slopes_at_points(settings, vectors, jobs)
     counts = prototypes or [0] * len(runs)
     work = [
-        delayed(_fold)(vectors, folds == fold, choices, slopes, counts)
+        delayed(answers_without)(vectors, folds == fold, choices, slopes, counts)
         for fold, choices in enumerate(zip(*runs, strict=True))
     ]
     by_fold = list(in_processes(jobs, work, heading))
@@ -103,7 +103,7 @@ def held_out(
     return of_runs
 
 
-def _fold(
+def answers_without(
     vectors: Vectors,
     left_out: Booleans,
     runs: Sequence[AtPoints],

@@ -172,8 +172,10 @@ class OutlierSpace:
         axes = (_axes_of_few if is_wide else _axes)(some, max(most, 1))
         shift = _shift(axes, STORED_BITS)
         weights = np.rint(np.ldexp(axes, shift))
+        at_end = _steps(X[-1][trials], *scales[-1])
+        of_trials = _clusters(_product(at_end, weights, shift), labels)
         points = tuple(
-            _point(*scale, _product(of_point, weights, shift), labels)
+            _point(*scale, _product(of_point, weights, shift), labels, of_trials)
             for scale, of_point in zip(scales, steps(), strict=True)
         )
         return cls(weights, shift, points)
@@ -295,7 +297,8 @@ def _leading(scatter: Floats, count: int) -> tuple[Floats, Floats]:
             values = np.zeros(count)
         if values[0] > FULL_RANK * values[-1]:
             return values, vectors
-    return eigh(scatter, subset_by_index=[n - count, n - 1])
+    values, vectors = eigh(scatter, subset_by_index=[n - count, n - 1])
+    return values, vectors
 
 
 def _shift(values: Floats, bits: int) -> int:
@@ -310,19 +313,31 @@ def _coordinates(z: Floats, whitening: Floats, shift: int) -> Floats:
     return np.asarray(np.clip(integers, -FARTHEST, FARTHEST))
 
 
-def _point(mean: Floats, gain: Floats, z: Floats, labels: Strings) -> OutlierPoint:
-    """The constants of a decision point at which trials have the components z."""
-    names, classes = np.unique(labels, return_inverse=True)
-    means = np.stack([z[classes == i].mean(axis=0) for i in range(len(names))])
-    between = (means - z.mean(axis=0)) * np.sqrt(np.bincount(classes))[:, None]
-    whitening, weights = _whitening(z - means[classes], between)
+def _numbers(labels: Strings) -> Integers:
+    """(n,) labels by their numbers."""
+    return np.asarray(np.unique(labels, return_inverse=True)[1], dtype=np.int64)
+
+
+def _clusters(z: Floats, labels: Strings) -> Integers:
+    """(n,) the cluster of each trial with the components z; of few trials each its
+    own."""
     of_trials = np.arange(len(z))
     if len(z) > MOST_ROWS:
-        count = max(MOST_CENTRES // len(names), 1)
+        count = max(MOST_CENTRES // len(np.unique(labels)), 1)
+        whitening, weights = _whitening(z, labels, _numbers(labels))
         for _ in range(TURNS):
             of_trials = clusters(z @ whitening * weights, labels, count)
-            within = z - _centres(z, of_trials)[of_trials]
-            whitening, weights = _whitening(within, between)
+            whitening, weights = _whitening(z, labels, of_trials)
+    return of_trials
+
+
+def _point(
+    mean: Floats, gain: Floats, z: Floats, labels: Strings, of_trials: Integers
+) -> OutlierPoint:
+    """The constants of a decision point at which trials have the components z."""
+    are_few = int(of_trials.max()) + 1 == len(z)
+    alike = _numbers(labels) if are_few else of_trials
+    whitening, weights = _whitening(z, labels, alike)
     fine = _shift(whitening, WHITENING_BITS)
     integers = np.rint(np.ldexp(whitening, fine))
     shift = fine - _shift(z @ whitening, STORED_BITS - 1)
@@ -341,14 +356,19 @@ def _centres(z: Floats, of_trials: Integers) -> Floats:
     return np.stack(sums, axis=1) / np.bincount(of_trials)[:, None]
 
 
-def _whitening(within: Floats, between: Floats) -> tuple[Floats, Floats]:
+def _whitening(z: Floats, labels: Strings, alike: Integers) -> tuple[Floats, Floats]:
     """A whitening (components, components), with its axes' weights in the distance to
     known objects.
 
     Args:
-        within: (n, components) deviations of trials from those that they are like.
-        between: (labels, components) weighted deviations of the labels.
+        z: (n, components) of trials.
+        labels: (n,) of them.
+        alike: (n,) numbers of the trials whose spread is made even.
     """
+    classes = _numbers(labels)
+    between = _centres(z, classes) - z.mean(axis=0)
+    between *= np.sqrt(np.bincount(classes))[:, None]
+    within = z - _centres(z, alike)[alike]
     components = within.shape[1]
     covariance = within.T @ within / len(within)
     variance = max(float(np.trace(covariance)) / components, 1.0)
@@ -387,7 +407,7 @@ def _alone(y: Floats, rows: Floats, of_trials: Integers, labels: Strings) -> Flo
 def _nearness(alone: Floats, labels: Strings) -> Floats:
     """(n,) one over the squared spacing of each row: half of how far it is `_alone`,
     and half the mean of this in its label."""
-    classes = np.unique(labels, return_inverse=True)[1]
+    classes = _numbers(labels)
     has_others = np.isfinite(alone)
     usual = float(alone[has_others].mean()) if has_others.any() else 1.0
     alone = np.where(has_others, alone, usual)

@@ -31,6 +31,7 @@ from train.model.pipeline import (
 )
 from train.report import page
 from train.report.figures import confusion
+from train.report.newest import newest_tables, time_of
 from train.report.score import interval, percent
 from train.report.section import ReportTable, Row, Section
 from train.report.summary import Prices, accuracy, candidates, names
@@ -185,20 +186,21 @@ def write(
 
 
 def _recordings(fitted: Fitted) -> Section:
-    """How many trials there are of each label, robot and day."""
+    """How many trials there are of each label, robot and day, and what the newest
+    changed."""
     values: list[tuple[str, str]] = []
     for trial in fitted.dataset.trials:
         meta = trial.recording.meta
         of_trial = {task: trial.labels.get(task, "") for task in fitted.chosen}
-        of_trial |= {key: str(meta.get(key, "")) for key in ("robot", "day")}
-        # A touch that a robot kept says when that was.
-        of_trial["day"] = of_trial["day"] or str(meta.get("kept", ""))[:10]
+        of_trial["robot"] = str(meta.get("robot", ""))
+        of_trial["day"] = time_of(trial)[:10]
         values += filter(itemgetter(1), of_trial.items())
     rows: list[Row] = [
         {"key": key, "value": value, "trials": count}
         for (key, value), count in sorted(Counter(values).items())
     ]
-    return Section("Recordings", tables=[ReportTable("recordings", "Trials", rows)])
+    counts = ReportTable("recordings", "Trials", rows)
+    return Section("Recordings", tables=[counts, *newest_tables(fitted)])
 
 
 def _accuracy(exported: Exported, task: str) -> Section:

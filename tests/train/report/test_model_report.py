@@ -14,6 +14,7 @@ from edge.record.saving import save
 from export.api import measure
 from tests.conftest import rows_of
 from train.report import model_report as report
+from train.report import newest
 
 
 @pytest.fixture(scope="module")
@@ -48,6 +49,19 @@ def model_and_page(recordings, tmp_path_factory):
 
 def table(page, name):
     return rows_of(page.parent / f"{name}.csv")
+
+
+def test_it_tells_what_the_newest_changed(model_and_page, monkeypatch):
+    fitted, page = model_and_page
+    assert not (page.parent / "newest.csv").exists()  # all are of one time
+    monkeypatch.setattr(newest, "NEWEST", 5)
+    monkeypatch.setattr(newest, "time_of", lambda trial: trial.path.stem)
+    (told,) = newest.newest_tables(fitted)
+    assert told.title.startswith("The newest 5 trials, since soft_3;")
+    (row,) = told.rows
+    assert row["task"] == "category"
+    assert row["trials"] == 15
+    assert 50.0 < row["accuracy % without the newest"] <= row["accuracy % with them"]
 
 
 def test_trials_are_counted_by_label_robot_and_day(model_and_page):
