@@ -32,7 +32,7 @@ def warnings(fitted: Fitted) -> list[str]:
     lines = [*_untouched(dataset), *_left_out(dataset)]
     lines += _outliers(fitted)
     longest = max(
-        float(trial.recording.t[-1]) - trial.onset_s for trial in dataset.trials
+        float(trial.recording.t[-1]) - trial.onset_s for trial in dataset.each()
     )
     if fitted.window_s > longest + 1e-9:
         lines.append(
@@ -153,7 +153,7 @@ def posture_accuracy(dataset: DataSet, task: str) -> float:
     """Leave-one-out accuracy of a task with the joint angles at onset alone and one
     neighbour."""
     at_onset = []
-    for trial in dataset.trials:
+    for trial in dataset.each():
         joints = trial.series.joints
         assert joints is not None
         finite = joints[np.isfinite(joints).all(axis=1)]

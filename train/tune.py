@@ -252,8 +252,8 @@ def longer_release(
     n = len(dataset.trials)
     if fragmented < MANY_FRAGMENTED * n:
         return levels, []
-    recordings = [trial.recording for trial in dataset.trials]
-    longest_s = max(float(recording.t[-1] - recording.t[0]) for recording in recordings)
+    times = (trial.recording.t for trial in dataset.each())
+    longest_s = max(float(t[-1] - t[0]) for t in times)
     end_s = min(round(longest_s + 0.05, 1), LONGEST_RELEASE_S)
     longer_s = [s for s in sorted({*RELEASES_S, end_s}) if release_s < s <= end_s]
     values = [levels, *(levels._replace(release_s=s) for s in longer_s)]

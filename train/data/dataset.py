@@ -131,6 +131,10 @@ class DataSet:
     kernels: Mapping[str, KernelTable] = field(default_factory=dict)
     scratch: Scratch = field(default_factory=Scratch, compare=False, repr=False)
 
+    def each(self) -> Iterator[Trial]:
+        """The trials, the arrays of a few of them in memory at once."""
+        return self.scratch.each(self.trials)
+
     def part(self, trials: NDArray[Any]) -> DataSet:
         """Some of the trials, by a mask (n,) or by their numbers."""
         numbers = np.arange(len(self.trials))[trials].tolist()
@@ -189,7 +193,7 @@ class DataSet:
         if missing:
             sizes = widths(missing, samples, self.layout, self.joints)
             table = self.scratch.empty((len(self.trials), sum(sizes)))
-            for row, trial in zip(table, self.scratch.each(self.trials), strict=True):
+            for row, trial in zip(table, self.each(), strict=True):
                 row[:] = feature_vector(
                     trial.series, window_s, samples, missing, self.kernels
                 )

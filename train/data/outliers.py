@@ -86,7 +86,12 @@ def by_joints(dataset: DataSet) -> Iterator[str]:
     if dataset.chain is None:
         return
     limits = np.array([pair or UNLIMITED for pair in dataset.chain.limits])
-    for path, angles in _angles_of(dataset).items():
+    judged: set[Path] = set()
+    for trial in dataset.each():
+        path, angles = trial.path, trial.recording.joints
+        if angles is None or path in judged:
+            continue
+        judged.add(path)
         excess = np.maximum(limits[:, 0] - angles, angles - limits[:, 1])
         excess = np.nan_to_num(excess, neginf=0.0)
         if excess.max() > LIMIT_TOLERANCE:
@@ -97,9 +102,3 @@ def by_joints(dataset: DataSet) -> Iterator[str]:
                 f"is at {angles[frame, joint]:g}, beyond its limits of {low:g} and "
                 f"{high:g}; {LEAVE_OUT}"
             )
-
-
-def _angles_of(dataset: DataSet) -> dict[Path, Floats]:
-    """{path: (n, dof) angles} of the recordings that have some."""
-    angles = {trial.path: trial.recording.joints for trial in dataset.trials}
-    return {path: joints for path, joints in angles.items() if joints is not None}

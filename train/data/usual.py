@@ -28,16 +28,18 @@ RESTS = 0.01
 
 def usual_touches(dataset: DataSet, window_s: float) -> dict[str, Any]:
     """{field of `edge.decide.info.ModelInfo`: what the training touches showed}."""
-    series = [trial.series for trial in dataset.trials]
     usual: dict[str, Any] = {}
-    frozen = [frame_doubts(touch, window_s)["frozen"] for touch in series]
+    frozen = []
+    rests = []
+    for trial in dataset.each():
+        frozen.append(frame_doubts(trial.series, window_s)["frozen"])
+        rests.append(_still_times(trial.series, window_s))
     usual["repeats"] = bool(np.mean(frozen) >= OFTEN)
     usual["onset"] = _onset(dataset)
-    rests = [_still_times(touch, window_s) for touch in series]
     if any(rests):
         longest = np.quantile(rests, 1.0 - SELDOM, axis=0)
         usual["still_s"] = tuple(longest.tolist())
-    speeds = np.array([touch.speed for touch in series])
+    speeds = np.array([trial.series.speed for trial in dataset.trials])
     if np.isfinite(speeds).any():
         low, high = np.nanquantile(speeds, (SELDOM, 1.0 - SELDOM))
         usual["speeds"] = SLOWER * float(low), FASTER * float(high) + RESTS
