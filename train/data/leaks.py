@@ -48,7 +48,7 @@ def is_late(trial: Trial) -> bool:
 
 def late_share(dataset: DataSet) -> float:
     """Share of the touches that were under way in their first frame."""
-    return float(np.mean([is_late(trial) for trial in dataset.each()]))
+    return float(np.mean([is_late(trial) for trial in dataset.trials]))
 
 
 def leaks(dataset: DataSet, y: Labels) -> list[str]:

@@ -1,5 +1,6 @@
 """What the training touches showed, by which the board doubts others."""
 
+from functools import partial
 from types import SimpleNamespace
 
 import numpy as np
@@ -25,7 +26,8 @@ def touch(speed, rest=0, joints=True, repeats=0, onset=""):
 
 
 def usual(trials):
-    return usual_touches(SimpleNamespace(trials=trials), 1.0)
+    dataset = SimpleNamespace(trials=trials, each=partial(iter, trials))
+    return usual_touches(dataset, 1.0)
 
 
 def test_the_standstill_and_the_speeds_are_those_of_nearly_all_trials():
