@@ -22,9 +22,11 @@ KIND = "kind"
 """Held out in place of an object where `kinds_of` names the kinds."""
 TRIAL = "trial"
 QUICK_FOLDS = 5
+GROUP_FOLDS = 20
+FEW = 300
 MANY = 1000
-"""From so many trials on there are five folds, in place of ten: four fifths of so many
-teach nearly as much as all."""
+"""Most folds of groups with at most `FEW` trials; with more trials there are ten folds,
+and five from `MANY` on: four fifths of so many trials teach nearly as much as all."""
 REPEATS = 3
 FEW_TO_REPEAT = 200
 """How often the trials are divided into folds where there are fewer than
@@ -100,7 +102,10 @@ def groups_of(
     for name, members in _memberships(dataset, leave_out).items():
         tasks = [t for t in y if t != leave_out and groupable(y[t], members)]
         if tasks:
-            folds = group_folds(members, fold_count(len(members), quick))
+            count = fold_count(len(members), quick)
+            if len(members) <= FEW and not quick:
+                count = GROUP_FOLDS
+            folds = group_folds(members, count)
             return Groups(name, members, frozenset(tasks), folds)
     return None
 
