@@ -47,11 +47,6 @@ from train.threads import in_processes, single_thread
 
 BESIDE = 0.25
 """Weight of directions that tell no labels apart, a power of two."""
-FOLDS = 20
-"""Folds of the held-out scores: more than a choice has, as a space of fewer
-trials finds all others newer."""
-FOLDS_OF_MANY = 10
-"""Where few rows stand for many trials, which a space of fewer trials has as well."""
 MOST_COMPONENTS = 40
 TRIALS_A_COMPONENT = 3
 """A component needs so many trials."""

@@ -42,7 +42,7 @@ from edge.elementary import log
 from edge.errors import InputError
 from edge.features.vector import FEATURES
 from train.data.folds import finest, stratified_folds
-from train.data.vectors import MOST_ROWS, Strings, Vectors
+from train.data.vectors import Strings, Vectors
 from train.model.curves import Curve, Evidence, cross_fitted
 from train.model.held_out import (
     AtPoints,
@@ -61,8 +61,6 @@ from train.model.never_met import (
     worth_of,
 )
 from train.model.outlier_score import (
-    FOLDS,
-    FOLDS_OF_MANY,
     OutlierSpace,
     Scores,
     held_out_scores,
@@ -244,8 +242,7 @@ class SequentialClassifier:
         least = least_deviations(vectors, self.drawn)
         with single_thread():
             self.space_ = OutlierSpace.of(vectors.X, labels, vectors.columns, least)
-        count = FOLDS if len(labels) <= MOST_ROWS else FOLDS_OF_MANY
-        outlier_folds = np.where(folds >= 0, stratified_folds(labels, count), -1)
+        outlier_folds = np.where(folds >= 0, stratified_folds(labels), -1)
 
         def scores_without(folds: Integers) -> Scores:
             return held_out_scores(
