@@ -16,12 +16,11 @@ static void text(const char *letters, ec_put put) {
 static void number(double x, ec_put put) {
   char digits[20];
   int n = 0;
-  bool is_known = x > -MOST && x < MOST;
-  uint64_t millionths = is_known ? (uint64_t)ec_rint((x < 0.0 ? -x : x) * 1e6) : 0;
-  if (!is_known) {
+  if (!(x > -MOST && x < MOST)) {
     text("null", put);
     return;
   }
+  uint64_t millionths = (uint64_t)ec_rint((x < 0.0 ? -x : x) * 1e6);
   if (x < 0.0 && millionths) put('-');
   for (; n < 7 || millionths; millionths /= 10) digits[n++] = (char)('0' + millionths % 10);
   int last = 0;
