@@ -74,8 +74,8 @@ def _decision(line: Line) -> str:
 
 
 def _release(line: Line) -> str:
-    duration = line["release_s"] - line["onset_s"]
-    return _at(line["release_s"], f"released{_contact(line)} after {duration:.2f} s")
+    duration = line["released_s"] - line["onset_s"]
+    return _at(line["released_s"], f"released{_contact(line)} after {duration:.2f} s")
 
 
 def _chip(line: Line) -> str:

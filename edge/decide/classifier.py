@@ -79,7 +79,7 @@ class Classifier:
     task that is the joint task of two others, as category is of softness and mobility,
     never contradicts them: it is decided when both are, by their labels, and they
     follow its rule where it has one that is as fast as theirs. An unusual contact waits
-    for the full window. `unsure` flags that the window ended before the confidence was
+    for the full window. `forced` flags that the window ended before the confidence was
     reached.
 
     A decision has flags, the reasons to doubt it: see `edge.decide.flags`.

@@ -134,11 +134,11 @@ class Early:
 
     def _answered(self, candidate: Decided, sure: bool) -> Decided:
         """The answer of the rule."""
-        unsure = not (sure or candidate.label is None or is_fixed(self._rule))
+        forced = not (sure or candidate.label is None or is_fixed(self._rule))
         stopped_by = "confidence" if sure else "window"
         answer = replace(candidate, error=self._error, stopped_by=stopped_by)
         # The rule does not go by votes.
-        return answer.flagged(unsure=unsure, tie=False)
+        return answer.flagged(forced=forced, tie=False)
 
 
 class JointDecision(Early):

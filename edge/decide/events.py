@@ -111,22 +111,22 @@ class Release:
     """A contact has ended.
 
     >>> import edge
-    >>> edge.Release(onset_s=1.25, release_s=3.5).to_dict()
-    {'event': 'release', 'onset_s': 1.25, 'release_s': 3.5}
+    >>> edge.Release(onset_s=1.25, released_s=3.5).to_dict()
+    {'event': 'release', 'onset_s': 1.25, 'released_s': 3.5}
 
     Attributes:
         onset_s: when it began.
-        release_s: when its end was certain.
+        released_s: when its end was certain.
         contact: as in `Onset`.
     """
 
     onset_s: float
-    release_s: float
+    released_s: float
     contact: int | None = None
 
     def to_dict(self) -> dict[str, Any]:
         """The event as a JSON object."""
-        return {**_line("release", self), "release_s": round(self.release_s, 6)}
+        return {**_line("release", self), "released_s": round(self.released_s, 6)}
 
 
 Event = Onset | Decided | Release

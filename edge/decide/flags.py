@@ -55,7 +55,7 @@ FLAGS = {
         "labels but for kinds such as category, has this flag"
     ),
     "tie": "another label had the same number of votes",
-    "unsure": "with `--error`: the window ended before the confidence was reached",
+    "forced": "with `--error`: the window ended before the confidence was reached",
     "uncertified": "with `--error`: no rule is certified for this task",
 }
 """{flag: its meaning}; docs/formats.md has the same table."""

@@ -159,7 +159,7 @@ static bool ask_all(void) {
 
 /* The answer of the task's rule. */
 static bool stop(ec_event *a, const ec_task *task, bool sure) {
-  if (a->label >= 0 && !sure && task->rule_confidence <= 1.0) a->flags |= EC_UNSURE;
+  if (a->label >= 0 && !sure && task->rule_confidence <= 1.0) a->flags |= EC_FORCED;
   a->stopped_by = sure ? EC_CONFIDENCE : EC_WINDOW;
   a->flags &= (uint16_t)~EC_TIE; /* the rule does not go by votes */
   return true;

@@ -33,7 +33,7 @@ enum {
   EC_UNUSUAL = 1 << 10,
   EC_UNKNOWN = 1 << 11,
   EC_TIE = 1 << 12,
-  EC_UNSURE = 1 << 13,
+  EC_FORCED = 1 << 13,
   EC_UNCERTIFIED = 1 << 14
 };
 

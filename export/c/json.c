@@ -6,7 +6,7 @@
 static const char *const kinds[] = {"onset", "release", "decision"};
 static const char *const flags[] = {
     "short", "gap", "frozen", "still_joints", "joint_limits", "missing_taxels", "missing_pose", "late",
-    "as_trained", "out_of_range", "unusual", "unknown", "tie", "unsure", "uncertified"};
+    "as_trained", "out_of_range", "unusual", "unknown", "tie", "forced", "uncertified"};
 
 static void text(const char *letters, ec_put put) {
   while (*letters) put(*letters++);
@@ -92,7 +92,7 @@ void ec_json(const ec_event *event, double now_s, ec_put put) {
   text(kinds[event->kind], put);
   put('"');
   pair("onset_s", event->onset_s, put);
-  if (event->kind == EC_RELEASE_EVENT) pair("release_s", event->t_s, put);
+  if (event->kind == EC_RELEASE_EVENT) pair("released_s", event->t_s, put);
   if (event->kind == EC_DECIDED_EVENT) decision(event, now_s, put);
   text("}\n", put);
 }

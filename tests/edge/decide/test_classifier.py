@@ -109,7 +109,7 @@ def test_each_contact_gets_its_own_decisions_even_where_their_windows_overlap(
     kinds = [type(e) for _, e in events]
     assert kinds == [Onset, Release, Onset, Decided, Decided, Release, Decided, Decided]
     assert events[1][1].onset_s == 0.2
-    assert events[1][1].release_s == pytest.approx(0.99)
+    assert events[1][1].released_s == pytest.approx(0.99)
     onsets = [e.onset_s for _, e in events if isinstance(e, Decided)]
     assert onsets == pytest.approx([0.2, 0.2, 1.3, 1.3])
 

@@ -85,8 +85,8 @@ def test_a_factor_without_confidence_leaves_its_joint_task_none(confidence):
 def test_a_joint_task_is_sure_where_both_factors_are(stops, stopped_by):
     answer = answered("y", "a", stops=stops)
     assert answer.stopped_by == stopped_by
-    assert ("unsure" in answer.flags) == (stopped_by == "window")
-    assert "unsure" not in answered("y", "a", stops, FIXED).flags
+    assert ("forced" in answer.flags) == (stopped_by == "window")
+    assert "forced" not in answered("y", "a", stops, FIXED).flags
 
 
 @pytest.mark.parametrize("first", ["x", None])

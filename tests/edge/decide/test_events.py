@@ -14,7 +14,7 @@ def test_an_event_is_what_a_line_of_json_says():
         1.2,
         0.25,
         0.3,
-        ("unsure",),
+        ("forced",),
         error=0.1,
         stopped_by="window",
         contact=2,
@@ -25,7 +25,7 @@ def test_an_event_is_what_a_line_of_json_says():
         "task": "t",
         "label": "a",
         "confidence": 0.5,
-        "flags": ["unsure"],
+        "flags": ["forced"],
         "position": None,
         "onset_s": 0.25,
         "window_s": 1.2,
@@ -33,7 +33,7 @@ def test_an_event_is_what_a_line_of_json_says():
         "error": 0.1,
         "stopped_by": "window",
     }
-    release = {"event": "release", "contact": 2, "onset_s": 0.25, "release_s": 2.5}
+    release = {"event": "release", "contact": 2, "onset_s": 0.25, "released_s": 2.5}
     assert Release(0.25, 2.5, contact=2).to_dict() == release
 
 

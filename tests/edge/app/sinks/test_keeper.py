@@ -23,7 +23,7 @@ def decision(confidence, *flags):
         (decision(0.8), {"all"}),
         (decision(0.79), {"all", "unsure"}),
         (decision(None), {"all", "unsure"}),
-        (decision(0.95, "unsure"), {"all", "unsure"}),
+        (decision(0.95, "forced"), {"all", "unsure"}),
         (decision(0.95, "unknown"), {"all", "unknown"}),
         (decision(0.95, "unusual", "tie"), {"all", "unusual"}),
     ],
