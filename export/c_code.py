@@ -198,35 +198,35 @@ class Source:
         )
 
     def _features(self) -> None:
-        """The courses, and the features that are made of them."""
-        courses: dict[tuple[int, int, int, int], int] = {}
+        """The series that are sampled, and the features that are made of them."""
+        sampled: dict[tuple[int, int, int, int], int] = {}
         features = []
         place = 0
         summed = 0
         for feature, width in zip(self._types, self._info.widths, strict=True):
-            course = self._course(feature, width)
-            samples, count, *_ = course
-            if not feature.quantity.kernels and course not in courses:
-                courses[course] = place
+            series = self._series(feature, width)
+            samples, count, *_ = series
+            if not feature.quantity.kernels and series not in sampled:
+                sampled[series] = place
                 place += samples * count
             if feature.summary not in ("", "rate"):
                 together = count if "relative" in feature.transforms else 1
                 summed = max(summed, samples * together)
-            number = [*courses].index(course) if course in courses else 0
+            number = [*sampled].index(series) if series in sampled else 0
             features.append(_feature(feature, self._layout, number))
         names = ("samples", "rows", "zone", "quantity")
         self._tables["features"] = features
-        self._tables["courses"] = [
-            record("ec_course", place=place, **dict(zip(names, course, strict=True)))
-            for course, place in courses.items()
+        self._tables["sampled"] = [
+            record("ec_series", place=place, **dict(zip(names, series, strict=True)))
+            for series, place in sampled.items()
         ]
         self._tables["kernels"] = [
             self._kernels(self._info.kernels.get(name, KernelTable((), ())))
             for name in ("taxel_kernels", "zone_kernels")
         ]
-        self._sizes |= {"courses": len(courses), "values": place, "summed": summed}
+        self._sizes |= {"sampled": len(sampled), "values": place, "summed": summed}
 
-    def _course(self, feature: Feature, width: int) -> tuple[int, int, int, int]:
+    def _series(self, feature: Feature, width: int) -> tuple[int, int, int, int]:
         """Samples, rows, zone and quantity of what a feature is made of."""
         samples = feature.samples or self._info.samples
         sums_up = feature.summary not in ("", "rate")
@@ -307,13 +307,13 @@ class Source:
         ]
 
 
-def _feature(feature: Feature, layout: SkinLayout, course: int) -> Array:
-    """The `ec_feature` of a feature that is made of a course."""
+def _feature(feature: Feature, layout: SkinLayout, series: int) -> Array:
+    """The `ec_feature` of a feature that is made of a series."""
     kinds = [TRANSFORMS.index(kind) for kind in feature.transforms]
     return record(
         "ec_feature",
         floor=feature.quantity.floor(layout),
-        course=course,
+        series=series,
         quantity=codes().index(feature.quantity.code),
         transforms=[*kinds, 0, 0, 0][:3],
         summary=SUMMARIES.index(feature.summary),

@@ -112,9 +112,9 @@ def _work(image: Image, sizes: Mapping[str, int], trials: int) -> dict[str, int]
         if task["counts"] != NOWHERE
     ]
     features = tables["features"]
-    courses = tables["courses"][features["course"]]
+    sampled = tables["sampled"][features["series"]]
     roots = np.isin(features["transforms"], ROOTS).sum(axis=1)
-    values = courses["samples"].astype(int) * courses["rows"]
+    values = sampled["samples"].astype(int) * sampled["rows"]
     coordinates = tables["places"][-sizes["tasks"] :]["components"].astype(int)
     return {
         "task": sizes["tasks"],

@@ -63,9 +63,9 @@ def write(path: Path, model: Model, dataset: DataSet, X: Floats) -> None:
             series.append(first[1])
     arrays = _frames(model, recordings)
     arrays["onset_s"] = np.array(onsets_s)
-    arrays["series_start"] = _starts(course.t for course in series)
-    arrays["series_t"] = np.concatenate([course.t for course in series])
-    arrays["series_counts"] = np.concatenate([integers_of(course) for course in series])
+    arrays["series_start"] = _starts(touch.t for touch in series)
+    arrays["series_t"] = np.concatenate([touch.t for touch in series])
+    arrays["series_counts"] = np.concatenate([integers_of(touch) for touch in series])
     arrays["vectors"] = _vectors(model, series, X)
     if info.decision_points_s:
         # The trials, which were trained with, and points between them.
@@ -104,7 +104,7 @@ def _starts(arrays: Iterable[NDArray[Any]]) -> NDArray[Any]:
 def _vectors(model: Model, series: Sequence[FeatureSeries], X: Floats) -> Floats:
     """The vectors of `write`."""
     rng = np.random.default_rng(20120101)
-    of_trials = np.stack([model.info.vector(course) for course in series])
+    of_trials = np.stack([model.info.vector(touch) for touch in series])
     rows = X[rng.permutation(len(X))[: VECTORS // 2]]
     first, second = rng.integers(0, len(X), (VECTORS // 2, 2)).T
     weight = rng.uniform(-0.5, 1.5, (len(first), 1))

@@ -82,12 +82,12 @@ static struct {
 
 /* The values of some rows of a feature. */
 static void block(const ec_feature *feature, uint32_t point, uint32_t rows) {
-  const ec_course *course = &ec_courses[feature->course];
-  uint32_t n = course->samples;
+  const ec_series *series = &ec_sampled[feature->series];
+  uint32_t n = series->samples;
   uint32_t size = rows * n;
   double step_s = ec_windows_s[point] / (n - 1);
   double *x = feature->summary <= EC_S_RATE ? now.out : summed_up;
-  const double *values = ec_values[point] + course->place + now.row * n;
+  const double *values = ec_values[point] + series->place + now.row * n;
   for (uint32_t i = 0; i < size; i++) {
     x[i] = values[i];
     if (feature->quantity == EC_Q_TAXEL_FORCE) x[i] = x[i] / EC_SCALE;
@@ -194,7 +194,7 @@ bool ec_vector_slice(uint32_t point) {
     if (now.row == 0) begin_kernels(kernels);
     convolve(kernels, point);
   } else {
-    rows = ec_courses[feature->course].rows;
+    rows = ec_sampled[feature->series].rows;
     if (is_whole(feature)) step = rows;
     block(feature, point, step);
   }

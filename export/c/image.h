@@ -49,8 +49,8 @@ typedef struct {
   uint32_t features;
   uint32_t width;
   uint32_t summed; /* numbers of a feature that are summed up together */
-  uint32_t courses;
-  uint32_t values; /* of all courses */
+  uint32_t sampled;
+  uint32_t values; /* of all series */
   uint32_t joints;
   uint32_t long_steps;
   uint32_t zones;
@@ -91,11 +91,11 @@ typedef struct {
   uint16_t rows; /* cells or joints */
   uint16_t zone; /* index in zone_names */
   uint16_t quantity;
-} ec_course;
+} ec_series;
 
 typedef struct {
   double floor; /* of the first transform, where it is a logarithm */
-  uint16_t course;
+  uint16_t series;
   uint8_t quantity;
   uint8_t transforms[3];
   uint8_t summary;
@@ -178,7 +178,7 @@ typedef struct {
 /* The tables, in their order. */
 #define EC_TABLES(X)                                                                              \
   X(ec_angle, angles) X(ec_link, links) X(ec_limit, limits) X(ec_feature, features)               \
-  X(ec_course, courses) X(ec_kernels, kernels) X(ec_task, tasks) X(ec_place, places)              \
+  X(ec_series, sampled) X(ec_kernels, kernels) X(ec_task, tasks) X(ec_place, places)              \
   X(ec_projection, projections) X(ec_doubt, doubts) X(double, windows_s) X(double, doubles)       \
   X(float, floats) X(int32_t, longs) X(uint16_t, words) X(int16_t, cell_of_taxel)                 \
   X(int16_t, kernel_cell_of_taxel) X(uint8_t, alive) X(uint8_t, zone_names) X(uint8_t, bytes)

@@ -124,7 +124,7 @@ int ec_follow(
 bool ec_released(double touched_s, double now_s);
 uint16_t ec_close(uint32_t point);
 
-/* samples.c: the values of each course at the sample times of a decision point, and those of the
+/* samples.c: the values of each series at the sample times of a decision point, and those of the
    channels of kernels */
 #define EC_SAMPLES_OF_KERNELS 120
 extern double ec_values[EC_MOST_POINTS][EC_AT_LEAST_1(EC_MOST_VALUES)];
@@ -172,7 +172,7 @@ ec_refusal ec_open(const void *address);
 #define EC_SPACES EC_SIZE(spaces)
 #define EC_FEATURES EC_SIZE(features)
 #define EC_WIDTH EC_SIZE(width)
-#define EC_COURSES EC_SIZE(courses)
+#define EC_SAMPLED EC_SIZE(sampled)
 #define EC_JOINTS EC_SIZE(joints)
 #define EC_LONG_STEPS EC_SIZE(long_steps)
 #define EC_CELLS EC_SIZE(cells)
@@ -187,7 +187,7 @@ ec_refusal ec_open(const void *address);
 #define ec_zone_names ec_model_now.zone_names /* EC_NO_ZONE comes last */
 #define ec_cell_of_taxel ec_model_now.cell_of_taxel
 #define ec_kernel_cell_of_taxel ec_model_now.kernel_cell_of_taxel
-#define ec_courses ec_model_now.courses
+#define ec_sampled ec_model_now.sampled
 #define ec_features ec_model_now.features
 #define ec_windows_s ec_model_now.windows_s
 #define ec_tasks ec_model_now.tasks
@@ -200,7 +200,7 @@ enum { EC_FIXED, EC_REVOLUTE, EC_CONTINUOUS, EC_PRISMATIC };
 enum { EC_QUANTITIES };
 enum { EC_T_NONE, EC_T_LOG, EC_T_SQRT, EC_T_RELATIVE };
 enum { EC_S_, EC_S_RATE, EC_S_MEAN, EC_S_DEVIATION, EC_S_ROUGHNESS };
-enum { EC_DOUBLES, EC_FLOATS, EC_PALETTE }; /* types of series */
+enum { EC_DOUBLES, EC_FLOATS, EC_PALETTE }; /* types of values */
 
 #define EC_PROBE 0.3
 #define EC_PROBES 8

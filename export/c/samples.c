@@ -56,22 +56,22 @@ static double spread_of(ec_row *row, uint32_t zone, uint32_t i) {
   return row->spreads[zone][i];
 }
 
-#define SPREAD(i) spread_of(row, course->zone, i)
+#define SPREAD(i) spread_of(row, series->zone, i)
 
 /* A value that is known in every frame. */
-static double sure_value(const ec_course *course, uint32_t index, ec_row *row) {
-  const int64_t *zone = row->zones[course->zone];
-  switch (course->quantity) {
+static double sure_value(const ec_series *series, uint32_t index, ec_row *row) {
+  const int64_t *zone = row->zones[series->zone];
+  switch (series->quantity) {
     EC_SURE_VALUES
     default: return 0.0;
   }
 }
 
 /* The place among what may be unknown; EC_UNSURE_VALUES of other quantities. */
-static uint32_t unsure_place(const ec_course *course) {
-  switch (course->quantity) {
-    case EC_Q_ZONE_ALONG: return 2u * course->zone;
-    case EC_Q_ZONE_AROUND: return 2u * course->zone + 1;
+static uint32_t unsure_place(const ec_series *series) {
+  switch (series->quantity) {
+    case EC_Q_ZONE_ALONG: return 2u * series->zone;
+    case EC_Q_ZONE_AROUND: return 2u * series->zone + 1;
     case EC_Q_STIFFNESS: return EC_OF_STIFFNESS;
     case EC_Q_CONTACT_MOTION: return EC_OF_MOTION;
     case EC_Q_FORCE_MOTION: return EC_OF_FORCE_MOTION;
@@ -204,20 +204,20 @@ static void hold_channels(uint32_t point, const ec_row *row, double until_s) {
 static void between(uint32_t point, state *from, ec_row *row) {
   span s = {0.0, from->row.t, row->t, 0, 0};
   uint32_t samples = 0;
-  for (const ec_course *course = ec_courses; course < ec_courses + EC_COURSES; course++) {
-    uint32_t unsure = unsure_place(course);
-    double *values = ec_values[point] + course->place;
-    if (course->samples != samples) {
-      samples = course->samples;
+  for (const ec_series *series = ec_sampled; series < ec_sampled + EC_SAMPLED; series++) {
+    uint32_t unsure = unsure_place(series);
+    double *values = ec_values[point] + series->place;
+    if (series->samples != samples) {
+      samples = series->samples;
       s.step_s = ec_windows_s[point] / (samples - 1);
       s.end = first_at(s.t1, s.step_s, 0.0, samples);
       s.begin = first_at(s.t0, s.step_s, 0.0, s.end);
     }
-    for (uint32_t i = 0; i < course->rows; i++, values += samples) {
+    for (uint32_t i = 0; i < series->rows; i++, values += samples) {
       if (unsure < EC_UNSURE_VALUES) {
         interpolate_unsure(s, &from->last[unsure + i], row->unsure[unsure + i], values);
       } else if (s.begin < s.end) {
-        interpolate(&s, sure_value(course, i, &from->row), sure_value(course, i, row), values);
+        interpolate(&s, sure_value(series, i, &from->row), sure_value(series, i, row), values);
       }
     }
   }
@@ -226,22 +226,22 @@ static void between(uint32_t point, state *from, ec_row *row) {
 
 /* The last values go on. */
 static void hold(uint32_t point, state *last) {
-  for (const ec_course *course = ec_courses; course < ec_courses + EC_COURSES; course++) {
-    uint32_t unsure = unsure_place(course);
-    double *values = ec_values[point] + course->place;
-    double step_s = ec_windows_s[point] / (course->samples - 1);
-    for (uint32_t row = 0; row < course->rows; row++, values += course->samples) {
+  for (const ec_series *series = ec_sampled; series < ec_sampled + EC_SAMPLED; series++) {
+    uint32_t unsure = unsure_place(series);
+    double *values = ec_values[point] + series->place;
+    double step_s = ec_windows_s[point] / (series->samples - 1);
+    for (uint32_t row = 0; row < series->rows; row++, values += series->samples) {
       bool is_sure = unsure == EC_UNSURE_VALUES;
       known end = {last->row.t, 0.0};
       if (is_sure) {
-        end.value = sure_value(course, row, &last->row);
+        end.value = sure_value(series, row, &last->row);
       } else if (last->last[unsure + row].t >= 0.0) {
         end = last->last[unsure + row];
       } else {
         end.t = 0.0; /* 0 where no frame knows it */
       }
-      uint32_t begin = first_at(end.t, step_s, 0.0, course->samples);
-      for (uint32_t i = begin; i < course->samples; i++) values[i] = end.value;
+      uint32_t begin = first_at(end.t, step_s, 0.0, series->samples);
+      for (uint32_t i = begin; i < series->samples; i++) values[i] = end.value;
     }
   }
   hold_channels(point, &last->row, EC_INFINITY);
