@@ -217,7 +217,9 @@ class Source:
         names = ("samples", "rows", "zone", "quantity")
         self._tables["features"] = features
         self._tables["sampled"] = [
-            record("ec_series", place=place, **dict(zip(names, series, strict=True)))
+            record(
+                "ec_time_series", place=place, **dict(zip(names, series, strict=True))
+            )
             for series, place in sampled.items()
         ]
         self._tables["kernels"] = [

@@ -82,7 +82,7 @@ static struct {
 
 /* The values of some rows of a feature. */
 static void block(const ec_feature *feature, uint32_t point, uint32_t rows) {
-  const ec_series *series = &ec_sampled[feature->series];
+  const ec_time_series *series = &ec_sampled[feature->series];
   uint32_t n = series->samples;
   uint32_t size = rows * n;
   double step_s = ec_windows_s[point] / (n - 1);

@@ -59,7 +59,7 @@ static double spread_of(ec_row *row, uint32_t zone, uint32_t i) {
 #define SPREAD(i) spread_of(row, series->zone, i)
 
 /* A value that is known in every frame. */
-static double sure_value(const ec_series *series, uint32_t index, ec_row *row) {
+static double sure_value(const ec_time_series *series, uint32_t index, ec_row *row) {
   const int64_t *zone = row->zones[series->zone];
   switch (series->quantity) {
     EC_SURE_VALUES
@@ -68,7 +68,7 @@ static double sure_value(const ec_series *series, uint32_t index, ec_row *row) {
 }
 
 /* The place among what may be unknown; EC_UNSURE_VALUES of other quantities. */
-static uint32_t unsure_place(const ec_series *series) {
+static uint32_t unsure_place(const ec_time_series *series) {
   switch (series->quantity) {
     case EC_Q_ZONE_ALONG: return 2u * series->zone;
     case EC_Q_ZONE_AROUND: return 2u * series->zone + 1;
@@ -204,7 +204,7 @@ static void hold_channels(uint32_t point, const ec_row *row, double until_s) {
 static void between(uint32_t point, state *from, ec_row *row) {
   span s = {0.0, from->row.t, row->t, 0, 0};
   uint32_t samples = 0;
-  for (const ec_series *series = ec_sampled; series < ec_sampled + EC_SAMPLED; series++) {
+  for (const ec_time_series *series = ec_sampled; series < ec_sampled + EC_SAMPLED; series++) {
     uint32_t unsure = unsure_place(series);
     double *values = ec_values[point] + series->place;
     if (series->samples != samples) {
@@ -226,7 +226,7 @@ static void between(uint32_t point, state *from, ec_row *row) {
 
 /* The last values go on. */
 static void hold(uint32_t point, state *last) {
-  for (const ec_series *series = ec_sampled; series < ec_sampled + EC_SAMPLED; series++) {
+  for (const ec_time_series *series = ec_sampled; series < ec_sampled + EC_SAMPLED; series++) {
     uint32_t unsure = unsure_place(series);
     double *values = ec_values[point] + series->place;
     double step_s = ec_windows_s[point] / (series->samples - 1);
