@@ -20,6 +20,23 @@ ALIGNED = 64
 Item = TypeVar("Item")
 
 
+def let_go(values: NDArray[Any]) -> None:
+    """Let go of the memory of an array that a file has; what is read again comes from
+    there."""
+    base: Any = values
+    while isinstance(base, np.ndarray) and not isinstance(base, np.memmap):
+        base = base.base
+    if isinstance(base, np.memmap) and hasattr(mmap, "MADV_DONTNEED"):  # not Windows
+        base._mmap.madvise(mmap.MADV_DONTNEED)  # type: ignore[attr-defined]
+
+
+def each_part(values: NDArray[Any]) -> Iterator[NDArray[Any]]:
+    """The parts of an array that a file may have, one in memory at once."""
+    for part in values:
+        yield part
+        let_go(part)
+
+
 class Scratch:
     """Temporary files, which `TMPDIR` places and which end with this.
 
@@ -91,9 +108,8 @@ class Scratch:
 
     def release(self) -> None:
         """Let go of the memory; what is read again comes from the files."""
-        if hasattr(mmap, "MADV_DONTNEED"):  # Windows has none
-            for chunk in self._chunks:
-                chunk._mmap.madvise(mmap.MADV_DONTNEED)  # type: ignore[attr-defined]
+        for chunk in self._chunks:
+            let_go(chunk)
 
     def each(self, items: Iterable[Item]) -> Iterator[Item]:
         """Some items whose arrays are in the files, a few of them in memory at once."""

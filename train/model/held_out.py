@@ -9,6 +9,7 @@ from joblib import delayed
 
 from edge.arrays import Booleans, Floats, Integers
 from edge.decide.info import margin
+from train.data.scratch import each_part, let_go
 from train.data.vectors import Strings, Vectors
 from train.model.pipeline import (
     Choice,
@@ -120,7 +121,7 @@ def answers_without(
             for choices, count in zip(runs, counts, strict=True)
         ]
         # A decision point at a time, as all together take much memory.
-        for point, x in enumerate(vectors.X):
+        for point, x in enumerate(each_part(vectors.X)):
             outside = x[~left_out]
             for run, choices in enumerate(runs):
                 training = replace(vectors, X=outside, y=y, prototypes=prototypes[run])
@@ -131,7 +132,9 @@ def answers_without(
                     )
                 )
             shared[point].clear()
-        return [answers(of_run, vectors.X[:, left_out]) for of_run in models]
+        tested = vectors.X[:, left_out]
+        let_go(vectors.X)
+        return [answers(of_run, tested) for of_run in models]
 
 
 def slopes_at_points(
@@ -164,7 +167,9 @@ def slopes_at_points(
 def _slopes_of(settings: Sequence[Choices], vectors: Vectors) -> Slopes:
     """`slopes_of`, in one thread."""
     with single_thread():
-        return slopes_of(settings, vectors)
+        slopes = slopes_of(settings, vectors)
+    let_go(vectors.X)
+    return slopes
 
 
 def at_points(
@@ -184,6 +189,6 @@ def at_points(
     return [
         ContactClassifier.of(at_point, replace(vectors, X=x), shared, of_point)
         for at_point, x, shared, of_point in zip(
-            choices, vectors.X, fits, slopes, strict=True
+            choices, each_part(vectors.X), fits, slopes, strict=True
         )
     ]

@@ -28,9 +28,9 @@ roots is rounded once by each operation, so that every engine gives the same bit
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
-from functools import partial, reduce
+from functools import reduce
 from typing import NamedTuple
 
 import numpy as np
@@ -41,6 +41,7 @@ from scipy.spatial.distance import cdist
 
 from edge.arrays import Booleans, Floats, Integers
 from edge.features.names import feature
+from train.data.scratch import each_part, let_go
 from train.data.vectors import MOST_ROWS, Strings, Vectors, blocks
 from train.model.prototypes import clusters
 from train.threads import in_processes, single_thread
@@ -155,9 +156,13 @@ class OutlierSpace:
             trials: (n,) mask of those that it is the space of.
         """
         labels = labels[trials]
-        scales = [_scale(x[trials], widths, least) for x in X]
-        # A decision point at a time, as all together take much memory.
-        steps = partial(map, lambda x, scale: _steps(x[trials], *scale), X, scales)
+        scales = [_scale(x[trials], widths, least) for x in each_part(X)]
+
+        def steps() -> Iterator[Floats]:
+            # A decision point at a time, as all together take much memory.
+            for x, scale in zip(each_part(X), scales, strict=True):
+                yield _steps(x[trials], *scale)
+
         columns = X.shape[-1] - int(np.isinf(least).sum())
         # Half of the columns, so that something can lie outside the components.
         most = min(MOST_COMPONENTS, len(labels) // TRIALS_A_COMPONENT, columns // 2)
@@ -449,4 +454,6 @@ def _fold_scores(
 ) -> Scores:
     with single_thread():
         space = OutlierSpace.of(X, labels, widths, least, ~left_out)
-        return space.scores(X[:, left_out])
+        tested = X[:, left_out]
+        let_go(X)
+        return space.scores(tested)

@@ -3,9 +3,11 @@
 import errno
 import os
 import pickle
+import re
 import signal
 import sys
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -15,7 +17,7 @@ from numpy.typing import NDArray
 from edge.errors import InputError
 from tests.conftest import ROOT, ended
 from train.data import scratch as module
-from train.data.scratch import Scratch
+from train.data.scratch import Scratch, each_part, let_go
 from train.threads import in_processes
 
 
@@ -45,6 +47,24 @@ def test_what_is_put_is_the_same_once_memory_was_released(scratch):
         assert copy.zones["skin"].tolist() == zones["skin"].tolist()
         assert copy.t.flags.writeable
     assert pickle.loads(pickle.dumps(scratch)).tables == {}
+
+
+def mapped_mb():
+    """Megabytes of files in the memory of this process."""
+    status = Path("/proc/self/status").read_text()
+    return int(re.search(r"RssFile:\s+(\d+) kB", status)[1]) / 1000
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="Linux tells what is mapped")
+def test_one_part_of_an_array_is_in_memory_at_once(scratch):
+    values = scratch.empty((8, 1_000_000))
+    values += np.arange(8.0)[:, None]
+    let_go(values[3:])
+    before = mapped_mb()
+    for number, part in enumerate(each_part(values)):
+        assert part.sum() == number * 1e6
+        assert mapped_mb() - before < 20.0
+    assert mapped_mb() - before < 4.0
 
 
 def test_other_processes_map_the_files(scratch):
