@@ -47,6 +47,7 @@ class Builder:
         self.made: list[NodeProto] = []
         self.constants: dict[str, TensorProto] = {}
         self._results: dict[tuple[Any, ...], str] = {}
+        self._numbers: dict[tuple[Any, ...], int] = {}
 
     def among(self, decision_points: Sequence[int], count: int) -> Builder:
         """A builder of the same graph, whose constants stand for some of `count`
@@ -75,6 +76,12 @@ class Builder:
         if name not in self.constants:
             self.constants[name] = numpy_helper.from_array(array, name)
         return name
+
+    def numbered(self, values: Sequence[Floats]) -> int:
+        """The number of some arrays; equal ones have the same, and are stored once."""
+        stack = np.stack(values)
+        contents = stack.shape, stack.tobytes()
+        return self._numbers.setdefault(contents, len(self._numbers))
 
     def by_decision_point(self, values: Sequence[Any], name: str) -> str:
         """Name of the value, at the decision point that is asked for, of a constant.

@@ -80,7 +80,7 @@ class Formula:
         at = self._last
         tasks = self._info.tasks
         near = [f"counts of {name}" for name in tasks if f"scales of {name}" in at]
-        widths = [len(at.numbers(f"coordinates of {name}", 2)) for name in tasks]
+        widths = [len(at.coordinates(name)) for name in tasks]
         widths += [int(projection["components"][0]) for projection in projections]
         return {
             "tasks": len(tasks),
@@ -202,7 +202,7 @@ class Formula:
     def _place(self, task: str, point: int) -> Array:
         """The `ec_place` of a task at a decision point."""
         at = self._points[point]
-        coordinates = at.numbers(f"coordinates of {task}", 2) / -2.0
+        coordinates = at.coordinates(task) / -2.0
         if f"mask of {task}" in at:
             coordinates = coordinates[at.numbers(f"mask of {task}", 1) > 0.0]
         rows, _ = self._pools.matrix(coordinates)

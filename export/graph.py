@@ -95,8 +95,11 @@ def _squares_of_task(
     if min(components) < width:
         masks = [(np.arange(width) < c).astype(np.float64) for c in components]
         z = build.node("Mul", z, build.by_decision_point(masks, f"mask of {task}"))
+    coordinates = [-2.0 * r.T for r in rows]
+    number = build.numbered(coordinates)
+    build.constant(number, f"rows of {task}")
     columns = build.by_decision_point_small(
-        [-2.0 * r.T for r in rows], f"coordinates of {task}"
+        coordinates, f"coordinates of rows {number}"
     )
     lengths = []
     for r, c in zip(rows, components, strict=True):

@@ -55,6 +55,11 @@ class Constants:
         """The number of a task's space."""
         return int(self.numbers(f"space of {task}"))
 
+    def coordinates(self, task: str) -> Array:
+        """(components, rows) those of a task's training trials, times -2."""
+        number = int(self.numbers(f"rows of {task}"))
+        return self.numbers(f"coordinates of rows {number}", 2)
+
     def projection(self, space: int) -> tuple[int, str]:
         """The first decision point of the projection in use, and the end of its
         constants' names."""
@@ -113,7 +118,7 @@ def answer(at: Constants, task: str, z: Floats, off: Floats) -> dict[str, Array]
     (n,)."""
     if f"mask of {task}" in at:
         z = z * at.numbers(f"mask of {task}", 1)
-    rows = at.numbers(f"coordinates of {task}", 2)
+    rows = at.coordinates(task)
     lengths = at.numbers(f"lengths of {task}", 1)
     squares = squared_distances(z, z, rows, lengths)
     labels = at.numbers(f"labels of {task}", 1)
