@@ -152,7 +152,8 @@ def typed(table: Table, names: Sequence[str]) -> str:
     places where a sign in their names means something else."""
     columns_of_file = list(table.file_names) or table.names
     terms = list(names)
-    if set(" ,;-()[]'\"") & set("".join(names)):
+    are_of_file = set(names) <= set(columns_of_file)
+    if are_of_file and set(" ,;-()[]'\"") & set("".join(names)):
         terms = [str(columns_of_file.index(name) + 1) for name in names]
     if len(terms) > 1:
         span = f"{terms[0]}-{terms[-1]}"
@@ -259,7 +260,9 @@ def _taxels(
     if table.shape and len(frames) == 1:
         return frames[0], table.shape
     candidates = table.candidates(rest)
-    return _running(table, candidates) if table.named else (candidates, table.shape)
+    if candidates and not table.named:
+        return candidates, table.shape
+    return _running(table, candidates)
 
 
 def _running(table: Table, rest: Sequence[str]) -> tuple[list[str], tuple[int, ...]]:

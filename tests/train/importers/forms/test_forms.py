@@ -57,3 +57,10 @@ def test_taxels_of_a_row_for_each_value_stand_in_the_order_of_their_numbers(tmp_
     assert table.names == ["t", "9", "10"]
     assert table.data["10"].tolist() == [10, 20]
     assert long.plain(7.0) == "7"
+
+
+def test_a_long_line_of_words_is_no_log_of_pairs(tmp_path):
+    """A pattern that goes back over it would take the square of its length."""
+    words = "a " * 20_000
+    with pytest.raises(InputError):
+        tables_of(tmp_path, "words.csv", f"{words}\n" * 3)
