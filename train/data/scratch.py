@@ -37,6 +37,11 @@ def each_part(values: NDArray[Any]) -> Iterator[NDArray[Any]]:
         let_go(part)
 
 
+def rows_of(values: NDArray[Any], rows: NDArray[Any]) -> NDArray[Any]:
+    """Some rows (parts, m, ...) of all parts of an array that a file may have."""
+    return np.stack([part[rows] for part in each_part(values)])
+
+
 class Scratch:
     """Temporary files, which `TMPDIR` places and which end with this.
 

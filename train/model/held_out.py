@@ -9,7 +9,7 @@ from joblib import delayed
 
 from edge.arrays import Booleans, Floats, Integers
 from edge.decide.info import margin
-from train.data.scratch import each_part, let_go
+from train.data.scratch import each_part, let_go, rows_of
 from train.data.vectors import Strings, Vectors
 from train.model.pipeline import (
     Choice,
@@ -132,8 +132,7 @@ def answers_without(
                     )
                 )
             shared[point].clear()
-        tested = vectors.X[:, left_out]
-        let_go(vectors.X)
+        tested = rows_of(vectors.X, left_out)
         return [answers(of_run, tested) for of_run in models]
 
 

@@ -41,7 +41,7 @@ from scipy.spatial.distance import cdist
 
 from edge.arrays import Booleans, Floats, Integers
 from edge.features.names import feature
-from train.data.scratch import each_part, let_go
+from train.data.scratch import each_part, rows_of
 from train.data.vectors import MOST_ROWS, Strings, Vectors, blocks
 from train.model.prototypes import clusters
 from train.threads import in_processes, single_thread
@@ -454,6 +454,4 @@ def _fold_scores(
 ) -> Scores:
     with single_thread():
         space = OutlierSpace.of(X, labels, widths, least, ~left_out)
-        tested = X[:, left_out]
-        let_go(X)
-        return space.scores(tested)
+        return space.scores(rows_of(X, left_out))
