@@ -201,8 +201,14 @@ def test_of_joint_labels_that_are_as_near_the_first_is_named(tmp_path):
 @pytest.mark.slow
 @needs_gcc
 def test_export_writes_a_program_that_reads_touches_as_text(tmp_path):
-    """Its lines are those of `replay`, but for what C lacks."""
+    """Its lines are those of `replay`, but for what C lacks; with letters of two, three
+    and four bytes in labels."""
     model = machine.without_an_arm(Model(demo.MODEL))
+    tasks = {
+        name: replace(task, labels=tuple(f"{label} ü€🧸" for label in task.labels))
+        for name, task in model.info.tasks.items()
+    }
+    model.info = replace(model.info, tasks=tasks)
     c_code.export(model, tmp_path)
     sources = map(str, tmp_path.glob("*.c"))
     build = ["gcc", *machine.COMMON, *machine.SANITIZED, *sources, "-o", "decide"]
