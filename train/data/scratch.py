@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from edge.errors import InputError
 
 CHUNK_BYTES = 1 << 26
-EVERY = 256
+EVERY = 64
 """Items that are in memory at once."""
 ALIGNED = 64
 Item = TypeVar("Item")
