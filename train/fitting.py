@@ -26,7 +26,7 @@ from train.model.pipeline import ContactClassifier
 from train.model.prototypes import counts_tried, divided
 from train.model.stopping import SequentialClassifier
 from train.notes import warnings
-from train.progress import Stage, stages
+from train.progress import Stage, announce, stages
 from train.tune import Loaded, choosing_of, trials_of, window, windows_of
 
 LOG = logging.getLogger(__name__)
@@ -34,6 +34,18 @@ FEWEST_TRIALS = 3
 MOST_CHOSEN = 1000
 """Trials that settings are chosen by; the model has all. Accuracy on unseen objects does
 not grow with more of them."""
+
+PROGRAM_BYTES = 4e8
+TRIAL_BYTES = 24e3
+MATRICES = 6
+"""Memory of the program, of what is known of a trial, and how many matrices of the
+vectors of a decision point there are at once: measured with 140 to 10,000 trials."""
+
+
+def memory_bytes(trials: int, columns: int) -> float:
+    """About how much memory the largest process of a fit takes at most, by the columns
+    of a vector."""
+    return PROGRAM_BYTES + trials * (TRIAL_BYTES + MATRICES * 8 * columns)
 
 
 def fit(data: DataSet | str | Path | Sequence[str | Path], **options: Any) -> Fitted:
@@ -109,6 +121,10 @@ def _fitted(
     dataset = measured.of(sorted(settings.features()))
     vectors = dataset.vectors(settings.window_s, fixed.samples, y)
     sequential = None
+    if fixed.progress:
+        columns = sum(dataset.widths(fixed.samples))
+        needed = memory_bytes(len(labels), columns)
+        announce(f"calibrating: about {needed / 1e9:.2g} GB of memory")
     with stage("calibrating"):
         if points:
             sequential = calibrate(measured, y, points, settings, fixed)

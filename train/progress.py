@@ -69,6 +69,11 @@ class LogLines:
             print(text.strip(), file=sys.stderr, flush=True)
 
 
+def announce(text: str) -> None:
+    """Print a line on stderr, above a progress bar."""
+    tqdm.write(printable(text), file=sys.stderr)
+
+
 def say(text: str) -> None:
     """Print a line on stdout, above a progress bar, without control characters."""
     tqdm.write(printable(text), file=sys.stdout)

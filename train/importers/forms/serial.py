@@ -10,9 +10,7 @@ from train.importers.options import TableOptions
 from train.importers.table import Table
 
 STAMP = re.compile(r"(\d\d:\d\d:\d\d\.\d+) -> ")
-PAIR = re.compile(
-    r"([^\W\d][\w ]{0,60}?)\s{0,8}[:=]\s{0,8}([-+]?[\d.]+)(?=[\s,;]|\Z)"
-)
+PAIR = re.compile(r"([^\W\d][\w ]{0,60}?)\s{0,8}[:=]\s{0,8}([-+]?[\d.]+)(?=[\s,;]|\Z)")
 """A name and its value. Longer names would take the square of a line's length."""
 
 
