@@ -63,7 +63,7 @@ def test_the_board_follows_a_contact_across_gaps_as_the_fit_did(folder_of, tmp_p
     assert not any(isinstance(event, Onset) for event in others)
     once = touch("soft", 101, gap=slice(90, 150))
     *_, end = classifier.classify(once)
-    assert end.release_s == pytest.approx(89 / HZ + 1.0)
+    assert end.released_s == pytest.approx(89 / HZ + 1.0)
 
 
 @pytest.mark.parametrize(

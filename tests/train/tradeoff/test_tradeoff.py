@@ -165,7 +165,8 @@ class TestEarly:
         (decisions,) = early.certified(dataset, (0.6, 1.2))["category"]
         assert decisions.error > early.ERRORS[0]
         assert decisions.right.all()
-        assert decisions.mean_s == pytest.approx(0.6)
+        # One of forty may be unusual, and waits.
+        assert decisions.mean_s <= 0.6 + 0.6 / 40 + 1e-9
 
 
 class TestBoard:
