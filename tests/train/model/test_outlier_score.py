@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 import pytest
+from scipy.linalg import eigh
 
 from train.data.folds import stratified_folds
 from train.data.vectors import Vectors
@@ -217,3 +218,22 @@ def test_a_trial_is_as_far_from_a_centre_as_if_it_had_no_part_in_it():
         y, rows, np.array([0, 0, 1, 1, 2]), np.array(list("aab"))
     )
     assert alone.tolist() == [2.0, 6.0, np.inf]
+
+
+def test_the_leading_axes_are_those_of_a_scatter_with_known_ones():
+    reflection = np.eye(60) - np.full((60, 60), 2.0 / 60)  # its columns are the axes
+    values = np.arange(1.0, 61.0) ** 2
+    leading, axes = outlier_score._leading((reflection * values) @ reflection, 9)
+    assert leading == pytest.approx(values[-9:], rel=1e-12)
+    assert np.abs(reflection.T @ axes)[-9:] == pytest.approx(np.eye(9), abs=1e-11)
+
+
+def test_a_scatter_with_fewer_axes_has_the_same_ones_each_time():
+    """Lanczos' method would go on from random vectors."""
+    rows = np.random.default_rng(0).normal(size=(4, 50))
+    scatter = rows.T @ rows
+    values, axes = outlier_score._leading(scatter, 9)
+    dense = eigh(scatter, subset_by_index=[41, 49])
+    assert np.array_equal(values, dense[0])
+    assert np.array_equal(axes, dense[1])
+    assert not outlier_score._leading(np.zeros((50, 50)), 9)[0].any()
