@@ -38,8 +38,8 @@ not grow with more of them."""
 PROGRAM_BYTES = 4e8
 TRIAL_BYTES = 24e3
 MATRICES = 6
-"""Memory of the program, of what is known of a trial, and how many matrices of the
-vectors of a decision point there are at once: measured with 140 to 10,000 trials."""
+"""Memory of the program and of the facts of a trial, and how many matrices of the vectors
+of a decision point there are at once: measured with 140 to 10,000 trials."""
 
 
 def memory_bytes(trials: int, columns: int) -> float:

@@ -1,7 +1,7 @@
 """What a person sees of a recorded touch: its curve, its decisions, and which touches
 ask for a look."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -69,9 +69,9 @@ def _is_decision(answer: Mapping[str, Any]) -> bool:
     )
 
 
-def is_unsure(confidence: float | None) -> bool:
-    """Whether a decision with this confidence is unsure."""
-    return confidence is None or confidence < UNSURE
+def is_unsure(confidence: float | None, flags: Collection[str]) -> bool:
+    """Whether a decision with this confidence and these flags is unsure."""
+    return confidence is None or confidence < UNSURE or "forced" in flags
 
 
 def kinds(meta: Mapping[str, Any], labels: Labels, left_out: bool = False) -> list[str]:
@@ -87,7 +87,7 @@ def kinds(meta: Mapping[str, Any], labels: Labels, left_out: bool = False) -> li
     belongs["left_out"] = left_out
     belongs["unlabelled"] = not labels or not labels.keys() >= decided.keys()
     for task, answer in decided.items():
-        belongs["unsure"] |= is_unsure(answer["confidence"])
+        belongs["unsure"] |= is_unsure(answer["confidence"], answer["flags"])
         belongs["unsure"] |= UNKNOWN in answer["flags"]
         belongs["wrong"] |= labels.get(task, answer["label"]) != answer["label"]
     return [kind for kind in KINDS if belongs[kind]]

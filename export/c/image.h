@@ -178,7 +178,7 @@ typedef struct {
 /* The tables, in their order. */
 #define EC_TABLES(X)                                                                              \
   X(ec_angle, angles) X(ec_link, links) X(ec_limit, limits) X(ec_feature, features)               \
-  X(ec_time_series, sampled) X(ec_kernels, kernels) X(ec_task, tasks) X(ec_place, places)              \
+  X(ec_time_series, sampled) X(ec_kernels, kernels) X(ec_task, tasks) X(ec_place, places)         \
   X(ec_projection, projections) X(ec_doubt, doubts) X(double, windows_s) X(double, doubles)       \
   X(float, floats) X(int32_t, longs) X(uint16_t, words) X(int16_t, cell_of_taxel)                 \
   X(int16_t, kernel_cell_of_taxel) X(uint8_t, alive) X(uint8_t, zone_names) X(uint8_t, bytes)

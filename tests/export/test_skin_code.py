@@ -475,9 +475,9 @@ def test_a_recorder_serves_raw_values_as_a_block_and_65535_of_what_it_cannot_rea
     library.start()
     wired.inject([Fault(bus=file.buses[1].device)])
     row = library.read()
-    raw, could_read = row.raw, row.could_read
-    assert 0 < could_read.sum() < raw.size
-    frame = np.where(could_read, raw, 65535).astype(">u2").tobytes()
+    raw = row.raw
+    assert 0 < row.could_read.sum() < raw.size
+    frame = np.where(row.could_read, raw, 65535).astype(">u2").tobytes()
     registers = {
         0x00: block.identity(raw.size, 16),
         0x10: sealed(b"\0\1" + frame),

@@ -88,7 +88,8 @@ def by_joints(dataset: DataSet) -> Iterator[str]:
     limits = np.array([pair or UNLIMITED for pair in dataset.chain.limits])
     judged: set[Path] = set()
     for trial in dataset.each():
-        path, angles = trial.path, trial.recording.joints
+        path = trial.path
+        angles = trial.recording.joints
         if angles is None or path in judged:
             continue
         judged.add(path)

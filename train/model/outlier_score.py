@@ -3,9 +3,9 @@
 Doubt has a space of its own, in which the choice of settings has no part: each column
 of the features is centred, divided by its standard deviation and cut off, and projected
 to principal components, which all decision points share. They are whitened by the
-spread within a label (Mahalanobis), or within a cluster of one where trials are many:
-centres that stand for trials show objects that were never met as well as all trials do,
-if what varies between the clusters of a label counts little.
+spread within a label (Mahalanobis), or within a cluster of one where trials are many, as
+the full window divides them: centres that stand for trials show objects that were never
+met as well as all trials do, if what varies between the clusters of a label counts little.
 
 Two scores are taken there, of the distance to the nearest training trial over that at
 which this trial and its label have their own neighbours (as the local outlier factor of

@@ -1,5 +1,6 @@
 """What the newest trials changed: the accuracy without them and with them."""
 
+import re
 from collections.abc import Sequence
 from dataclasses import replace
 
@@ -17,6 +18,8 @@ from train.report.section import ReportTable, Row
 
 NEWEST = 1000
 FOLDS = 5
+DATE = re.compile(r"\d{4}-\d\d-\d\d")
+"""How a time begins by which trials are put in order; "Monday" is none."""
 
 
 def time_of(trial: Trial) -> str:
@@ -29,9 +32,9 @@ def time_of(trial: Trial) -> str:
 def newest_of(times: Sequence[str]) -> Booleans | None:
     """(n,) whether each trial is one of the newest, by their times; None where those are
     not known, or are more than half of all."""
-    first = sorted(times)[-NEWEST:][0]
-    newest = np.array([time >= first for time in times])
-    return newest if first and newest.mean() <= 0.5 else None
+    last = sorted(times)[-NEWEST:]
+    newest = np.array([time >= last[0] for time in times])
+    return newest if all(map(DATE.match, last)) and newest.mean() <= 0.5 else None
 
 
 def right_by(

@@ -212,7 +212,7 @@ def reasons_of(decided: Sequence[Decided]) -> set[str]:
     reasons = {"all"}
     for decision in decided:
         reasons.update(set(REASONS) & set(decision.flags))
-        if is_unsure(decision.confidence) or "forced" in decision.flags:
+        if is_unsure(decision.confidence, decision.flags):
             reasons.add("unsure")
     return reasons
 

@@ -20,6 +20,7 @@ HALVES = {"softness": "soft", "mobility": "fixed"}
         (kept_meta({"a": "x"}, a=("x", 0.8)), []),
         (kept_meta({"a": "x"}, a=("x", 0.79)), ["unsure"]),
         (kept_meta({"a": "x"}, a=("x", None)), ["unsure"]),
+        (kept_meta({"a": "x"}, a=("x", 0.9, "forced")), ["unsure"]),
         (kept_meta({"a": "x"}, a=("x", 0.9, "unknown")), ["unsure"]),
         (kept_meta({"a": "y"}, a=("x", 0.9)), ["wrong"]),
         (kept_meta({"b": "z"}, a=("x", 0.9)), ["unlabelled"]),

@@ -55,9 +55,11 @@ def test_it_tells_what_the_newest_changed(model_and_page, monkeypatch):
     fitted, page = model_and_page
     assert not (page.parent / "newest.csv").exists()  # all are of one time
     monkeypatch.setattr(newest, "NEWEST", 5)
-    monkeypatch.setattr(newest, "time_of", lambda trial: trial.path.stem)
+    monkeypatch.setattr(
+        newest, "time_of", lambda trial: f"2026-11-28 {trial.path.stem}"
+    )
     (told,) = newest.newest_tables(fitted)
-    assert told.title.startswith("The newest 5 trials, since soft_3;")
+    assert told.title.startswith("The newest 5 trials, since 2026-11-28 soft_3;")
     (row,) = told.rows
     assert row["task"] == "category"
     assert row["trials"] == 15

@@ -23,6 +23,7 @@ def a_few_are_newest(monkeypatch):
         (FEW[:5], None),  # more than half
         ([FEW[0]] * 10, None),  # all of one day
         ([*[""] * 8, *FEW[:2]], None),  # the third newest has no day
+        ([*FEW[:8], "Monday", "Tuesday"], None),
     ],
 )
 def test_the_newest_are_told_by_their_times(times, expected):
