@@ -24,6 +24,8 @@ LN2_LOW = 1.9082149292705877e-10
 SQRT_HALF = 0.7071067811865476
 ROUNDING = 6755399441055744.0
 """1.5 times 2^52. Added and taken off, it rounds a number to a whole one."""
+OF_SINE = tuple(float(n * (n + 1)) for n in range(22, 0, -2))
+"""Divisors of the series of the sine, the last term's first."""
 
 
 def sin(x: Any) -> Any:
@@ -32,8 +34,8 @@ def sin(x: Any) -> Any:
     rest = (x - turns * HALF_TURN) - turns * HALF_TURN_REST
     square = rest * rest
     series = 1.0
-    for n in range(22, 0, -2):
-        series = 1.0 - series * square / (n * (n + 1))
+    for divisor in OF_SINE:
+        series = 1.0 - series * square / divisor
     odd = turns - 2.0 * ((0.5 * turns + ROUNDING) - ROUNDING)
     return rest * series * (1.0 - 2.0 * odd * odd)
 

@@ -141,7 +141,7 @@ def mixes(channels: int) -> NDArray[np.float32]:
 
 
 def shifted(channels: Integers, shifts: Sequence[int]) -> NDArray[np.int32]:
-    """Channels (c, samples) times powers of two, cut off at the largest number of
+    """Channels (..., c, samples) times powers of two, cut off at the largest number of
     `BITS` bits."""
     by = np.array(shifts)[:, None]
     scaled = np.minimum(channels, 1 << 48) << np.maximum(by, 0) >> np.maximum(-by, 0)
@@ -149,49 +149,52 @@ def shifted(channels: Integers, shifts: Sequence[int]) -> NDArray[np.int32]:
 
 
 def convolved(channels: NDArray[np.int32]) -> NDArray[np.int32]:
-    """(convolutions, samples) results of `shifted` channels (c, samples)."""
+    """(..., convolutions, samples) results of `shifted` channels (..., c, samples)."""
     # Sums of nine such numbers are below 2^18: float32 holds them exactly, whatever the
     # order.
-    mixed = (mixes(len(channels)) @ channels.astype(np.float32)).astype(np.int32)
-    mixed = mixed.reshape(len(DILATIONS), len(WEIGHTS), SAMPLES)
+    mixed = (mixes(channels.shape[-2]) @ channels.astype(np.float32)).astype(np.int32)
+    touches = channels.shape[:-2]
+    mixed = mixed.reshape(*touches, len(DILATIONS), len(WEIGHTS), SAMPLES)
     results = np.empty_like(mixed)
-    for dilation, rows, result in zip(DILATIONS, mixed, results, strict=True):
+    for i, dilation in enumerate(DILATIONS):
         reach = dilation * (TAPS // 2)
-        padded = np.zeros((len(WEIGHTS), SAMPLES + 2 * reach), dtype=np.int32)
-        padded[:, reach:-reach] = rows
-        taps = sliding_window_view(padded, 2 * reach + 1, axis=1)[..., ::dilation]
-        np.einsum("kt,kst->ks", WEIGHTS, taps, out=result)
-    return results.reshape(CONVOLUTIONS, SAMPLES)
+        padded = np.zeros((*touches, len(WEIGHTS), SAMPLES + 2 * reach), dtype=np.int32)
+        padded[..., reach:-reach] = mixed[..., i, :, :]
+        taps = sliding_window_view(padded, 2 * reach + 1, axis=-1)[..., ::dilation]
+        np.einsum("kt,...kst->...ks", WEIGHTS, taps, out=results[..., i, :, :])
+    return results.reshape(*touches, CONVOLUTIONS, SAMPLES)
 
 
 def shares(channels: Integers, table: KernelTable) -> Floats:
-    """(biases,) share of the samples at which each kernel's result is above its bias.
+    """(..., biases) share of the samples at which each kernel's result is above its
+    bias.
 
     Args:
-        channels: (c, samples) whole numbers from 0.
+        channels: (..., c, samples) whole numbers from 0.
         table: of training.
     """
     results = convolved(shifted(channels, table.shifts))
-    results[~_inside()] = LOWEST
+    results[..., ~_inside()] = LOWEST
     biases = len(table.biases)
-    of_bias = results[convolution_of_bias(biases)]
+    of_bias = results[..., convolution_of_bias(biases), :]
     above = of_bias > np.array([table.biases], np.int32).T
-    counts = np.count_nonzero(above, axis=1)
+    counts = np.count_nonzero(above, axis=-1)
     return np.asarray(counts / _samples_of_bias(biases))
 
 
 def shares_of(
     series: FeatureSeries,
-    window_s: float,
+    windows_s: Floats,
+    frames: Integers,
     name: str,
     tables: Mapping[str, KernelTable],
 ) -> Floats:
-    """The `shares` of a feature in a contact's window, by its table.
+    """(windows, biases) the `shares` of a feature in a contact's windows, by its table.
 
     Raises:
         InputError: the feature was not measured, or has no table.
     """
-    channels = kernel_channels(series, window_s, name)
+    channels = kernel_channels(series, windows_s, name, frames)
     if name not in tables:
         raise InputError(f"{name} needs a table that training made")
     return shares(channels, tables[name])
@@ -199,19 +202,20 @@ def shares_of(
 
 def kernel_channels(
     series: FeatureSeries,
-    window_s: float,
+    window_s: float | Floats,
     name: str,
+    frames: Integers | None = None,
 ) -> Integers:
-    """(channels, `SAMPLES`) numbers to which a feature's kernels are
-    applied.
+    """(..., channels, `SAMPLES`) numbers to which a feature's kernels are applied.
 
     The last value before each time is held, and nothing is interpolated, so all are
     whole numbers.
 
     Args:
         series: the contact, as `FeatureSeries.felt` gives it.
-        window_s: seconds from onset.
+        window_s: (...) seconds from onset.
         name: of the feature.
+        frames: (...) of the contact that count in each window; all where None.
 
     Raises:
         InputError: the feature was not measured.
@@ -219,9 +223,12 @@ def kernel_channels(
     rows = ALONE[name].measure(ZoneSeries(series, "skin"))
     if rows is None:
         raise not_measured(name)
-    step_s = window_s / (SAMPLES - 1)
-    times = np.arange(SAMPLES) * step_s + CLOCK_ROUNDING_S
-    return np.asarray(rows[series.t.searchsorted(times, side="right") - 1].T)
+    steps = np.asarray(window_s)[..., None] / (SAMPLES - 1)
+    times = np.arange(SAMPLES) * steps + CLOCK_ROUNDING_S
+    held = series.t.searchsorted(times, side="right")
+    if frames is not None:
+        held = np.minimum(held, frames[..., None])
+    return np.asarray(np.swapaxes(rows[held - 1], -1, -2))
 
 
 def channels_of(name: str, layout: SkinLayout) -> int:

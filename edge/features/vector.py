@@ -10,7 +10,7 @@ from itertools import groupby
 
 import numpy as np
 
-from edge.arrays import Array, Floats
+from edge.arrays import Array, Floats, Integers
 from edge.errors import InputError
 from edge.features import kernels, transforms
 from edge.features.kernels import KernelTable
@@ -109,20 +109,42 @@ def feature_vector(
             empty, a feature does not exist or was not measured, or its table is
             missing.
     """
-    if not (math.isfinite(window_s) and window_s > 0.0):
-        raise InputError(f"the window must be above 0 seconds, not {window_s!r}")
+    return feature_vectors(series, [window_s], samples, features, tables)[0]
+
+
+def feature_vectors(
+    series: FeatureSeries,
+    windows_s: Sequence[float],
+    samples: int = SAMPLES,
+    features: Sequence[str] = FEATURES,
+    tables: Mapping[str, KernelTable] | None = None,
+) -> Floats:
+    """(windows, p) the `feature_vector` of each of several windows, in less time."""
+    for window_s in windows_s:
+        if not (math.isfinite(window_s) and window_s > 0.0):
+            raise InputError(f"the window must be above 0 seconds, not {window_s!r}")
     if samples < 2:
         raise InputError(f"a feature needs at least 2 samples, not {samples!r}")
     types = feature_types(features)
-    series = series.felt(window_s)
-    if series.t.size == 0:
+    felt = [series.felt(window_s) for window_s in windows_s]
+    frames = np.array([contact.t.size for contact in felt])
+    if not frames.all():
         raise InputError("the contact has no frame")
-    zones = cache(partial(ZoneSeries, series))
-    time_series = _TimeSeries(series, window_s, tables or {}, zones)
+    longest = felt[int(frames.argmax())]
+    if not all((of.t == longest.t[: of.t.size]).all() for of in felt):
+        # A frame without contact counts in one window, and not in another.
+        of_windows = [
+            feature_vectors(series, [window_s], samples, features, tables)
+            for window_s in windows_s
+        ]
+        return np.concatenate(of_windows)
+    zones = cache(partial(ZoneSeries, longest))
+    time_series = _TimeSeries(longest, np.array(windows_s), frames, tables or {}, zones)
     # The model refuses a value that is too large for a float.
     with np.errstate(all="ignore"):
         groups = [tuple(group) for _, group in groupby(types, key=_kind)]
-        return np.concatenate([time_series.block(group, samples) for group in groups])
+        blocks = [time_series.block(group, samples) for group in groups]
+    return np.concatenate(blocks, axis=1)
 
 
 def _kind(feature: Feature) -> tuple[str, int, tuple[str, ...], str]:
@@ -133,37 +155,40 @@ def _kind(feature: Feature) -> tuple[str, int, tuple[str, ...], str]:
 
 @dataclass
 class _TimeSeries:
-    """The measurements of a contact, sampled at times of its window."""
+    """The measurements of a contact, sampled at times of its windows (m,): of each, the
+    first `frames` (m,) of the series count."""
 
     series: FeatureSeries
-    window_s: float
+    windows_s: Floats
+    frames: Integers
     tables: Mapping[str, KernelTable]
     zones: Callable[[str], ZoneSeries]
 
     def block(self, group: tuple[Feature, ...], samples: int) -> Floats:
-        """Values of features of one kind, one after another."""
+        """(m, values) of features of one kind, one after another."""
         first = group[0]
         if first.quantity.kernels:
             return kernels.shares_of(
                 self.series,
-                self.window_s,
+                self.windows_s,
+                self.frames,
                 first.name,
                 self.tables,
             )
         samples = first.samples or samples
-        step = self.window_s / (samples - 1)
-        values = self._sampled(group, np.arange(samples, dtype=np.float64) * step)
+        steps = self.windows_s[:, None] / (samples - 1)
+        values = self._sampled(group, np.arange(samples, dtype=np.float64) * steps)
         if first.transforms or first.summary:
             values = transforms.transformed(values, group, self.series.layout)
-            values = transforms.summarised(values, first.summary, step)
-        return values.reshape(-1)
+            values = transforms.summarised(values, first.summary, steps)
+        return np.swapaxes(values, 0, 1).reshape(len(self.windows_s), -1)
 
     def _sampled(
         self,
         group: tuple[Feature, ...],
         times: Floats,
     ) -> Floats:
-        """(rows, times) features of one value a frame, or of one wide feature."""
+        """(rows, m, times) features of one value a frame, or of one wide feature."""
         first = group[0]
         t = self.series.t
         if first.quantity.wide:
@@ -172,14 +197,19 @@ class _TimeSeries:
             values = np.array(list(map(self._measured, group)), dtype=np.float64)
         valid = ~np.isnan(values)
         complete = valid.all(axis=1)
-        sampled = np.zeros((len(values), len(times)))
-        sampled[complete] = _resample(times, t, values[complete])
-        for i in np.flatnonzero(~complete & valid.any(axis=1)):
-            sampled[i] = _resample(times, t[valid[i]], values[i, valid[i]])
+        sampled = np.zeros((len(values), *times.shape))
+        last = self.frames[:, None] - 1
+        sampled[complete] = _resample(times, t, values[complete], last)
+        for i in np.flatnonzero(~complete):
+            for of_window, at, n in zip(sampled[i], times, self.frames, strict=True):
+                known = np.flatnonzero(valid[i, :n])
+                if known.size:
+                    ends = known.size - 1
+                    of_window[:] = _resample(at, t[known], values[i, known], ends)
         if first.quantity.cells:
             return sampled / self.zones(first.zone).scale
         is_change = first.quantity.name == "joint_change"
-        return sampled - sampled[:, :1] if is_change else sampled
+        return sampled - sampled[..., :1] if is_change else sampled
 
     def _measured(self, feature: Feature) -> Array:
         """(n,) or (n, values) of a feature in every frame; NaN where it cannot be
@@ -196,13 +226,15 @@ def _resample(
     times: Floats,
     t: Floats,
     values: Array,
+    last: Integers | int,
 ) -> Floats:
-    """Values (..., n) at the increasing times `t`, interpolated to `times`.
+    """Values (..., n) at the increasing times `t`, interpolated to `times`, where the
+    last that counts is held.
 
     They never overshoot their neighbours. The fraction of a step is computed before it
     multiplies a difference of values, as a slope over a very short step could overflow.
     """
-    after = np.clip(t.searchsorted(times, side="right"), 1, t.size - 1)
+    after = np.minimum(np.maximum(t.searchsorted(times, side="right"), 1), last)
     before = np.maximum(after - 1, 0)
     step = t[after] - t[before]
     step[step == 0.0] = 1.0  # of a single frame

@@ -69,12 +69,17 @@ class Zones:
         if contact is None:
             return [0] * (self.width * len(self.names))
         row: list[int] = []
+        # The skin and its halves have the same counts.
+        touched: dict[bool, tuple[Array, Array]] = {}
         for zone in self.names:
             half = self._halves.get(zone, slice(None))
-            mask = contact.mask if zone == "contact" else active.mask
-            counts = (active.counts * mask)[:, half]
-            # Of each column: counts, times row, times row squared.
-            lines = self._rows @ counts
+            in_contact = zone == "contact"
+            mask = contact.mask if in_contact else active.mask
+            if in_contact not in touched:
+                of_mask = active.counts * mask
+                # Of each column: counts, times row, times row squared.
+                touched[in_contact] = of_mask, self._rows @ of_mask
+            counts, lines = (values[:, half] for values in touched[in_contact])
             closed = self._wraps and zone not in self._halves
             cut = best_cut(lines[0].tolist()) if closed else 0
             (force, cols, cols_cols), (rows, rows_cols, _), (rows_rows, *_) = (

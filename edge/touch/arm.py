@@ -3,7 +3,7 @@ skin."""
 
 import math
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Self
@@ -84,6 +84,7 @@ class Chain:
         self.limits = tuple(joint.limits for joint in moving)
         """(lower, upper) of each moving joint in radians, or metres if it slides; or
         None."""
+        self._slides = [joint.kind == "prismatic" for joint in moving]
         self.links = [
             (
                 joint.kind,
@@ -128,13 +129,12 @@ class Chain:
         transform = np.zeros((*angles.shape[:-1], 4, 4))
         transform[..., 3, 3] = 1.0
         of_each_joint = np.moveaxis(angles, -1, 0)[..., None]
-        transform[..., :3, :] = np.stack(
-            self.carried(of_each_joint, np.eye(4)), axis=-2
-        )
+        motions = self._motions(of_each_joint)
+        transform[..., :3, :] = np.stack(self._carried(motions, np.eye(4)), axis=-2)
         return transform
 
-    def point(self, q: ArrayLike, position: Sequence[float]) -> Vector:
-        """A point of the tip in the base's frame, as plain floats: `pose(q)` times it.
+    def points(self, q: ArrayLike, positions: Iterable[Vector]) -> list[Vector]:
+        """Points of the tip in the base's frame, as plain floats: `pose(q)` times each.
 
         It is much faster than computing the pose. Rotations follow Rodrigues' formula,
         R = I + sin(q) K + (1 - cos(q)) K^2. It is computed with 1 - cos(q) = 2
@@ -142,7 +142,7 @@ class Chain:
 
         Args:
             q: (dof,) as for `pose`.
-            position: (3,) in the tip's frame, metres.
+            positions: in the tip's frame, metres.
 
         Raises:
             InputError: as `pose`.
@@ -150,30 +150,37 @@ class Chain:
         angles = np.asarray(q).tolist()
         if len(angles) != self.dof or not sum(map(abs, angles)) <= MOST_RAD:
             self.pose(q)  # raises
-        x, y, z = self.carried(angles, (*position, 1.0))
-        return x, y, z
+        motions = self._motions(angles)
+        return [self._carried(motions, (*position, 1.0)) for position in positions]
 
-    def carried(self, angles: Any, position: Any) -> tuple[Any, ...]:
-        """(x, y, z) in the base's frame of coordinates (4,) in the tip's frame.
+    def _motions(self, angles: Sequence[Any]) -> list[tuple[Any, Any]]:
+        """Of each moving joint the sine and 1 - the cosine of its angle, or its travel
+        twice; angles are numbers or arrays."""
+        motions = []
+        for slides, angle in zip(self._slides, angles, strict=True):
+            if slides:
+                motions.append((angle, angle))
+            else:
+                half = sin(0.5 * angle)
+                motions.append((sin(angle), 2.0 * half * half))
+        return motions
 
-        Angles and coordinates are numbers, or arrays of equal shape.
-        """
+    def _carried(self, motions: Sequence[tuple[Any, Any]], position: Any) -> Any:
+        """(x, y, z) in the base's frame of coordinates (4,) in the tip's frame, which
+        are numbers, or arrays of the shape of `_motions`."""
         x, y, z, w = position
-        remaining = reversed(angles)
+        remaining = reversed(motions)
         for kind, (kx, ky, kz), step, (dx, dy, dz) in reversed(self.links):
             x = x + dx * w
             y = y + dy * w
             z = z + dz * w
             if kind == "prismatic":
-                travel = next(remaining) * w
+                travel = next(remaining)[0] * w
                 x = x + kx * travel
                 y = y + ky * travel
                 z = z + kz * travel
             elif kind != "fixed":
-                angle = next(remaining)
-                half = sin(0.5 * angle)
-                f = sin(angle)
-                g = 2.0 * half * half
+                f, g = next(remaining)
                 ax = ky * z - kz * y
                 ay = kz * x - kx * z
                 az = kx * y - ky * x

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from operator import sub
 from typing import TYPE_CHECKING, Any, Protocol, Self
@@ -266,40 +266,32 @@ class Contact:
             if self._rows:
                 return {name: self._rows[-1][name] for name in motions}
             return motions
+        centroids = {}
         if measures.motion:
-            motions["motion"] = self._distance("motion", region.centroid, frame.joints)
+            centroids["motion"] = region.centroid
         if measures.force_motion:
             # The contact's zone comes first.
             _, _, force, rows, cols, *_ = counted[PLAIN:]
-            centroid = rows / force, cols / force % self.layout.cols
-            distance = self._distance("force_motion", centroid, frame.joints)
-            motions["force_motion"] = distance
+            centroids["force_motion"] = rows / force, cols / force % self.layout.cols
+        places = self._located(centroids.values(), frame.joints)
+        if places is None:
+            self.missing_pose |= bool(centroids)
+            return motions | dict.fromkeys(centroids, math.nan)
+        for name, place in zip(centroids, places, strict=True):
+            start = self._starts.setdefault(name, place)
+            motions[name] = length(map(sub, place, start))
         return motions
-
-    def _distance(
-        self,
-        name: str,
-        centroid: tuple[float, float],
-        joints: Floats | None,
-    ) -> float:
-        """Distance from where this centroid was first seen; NaN without a pose."""
-        position = self._located(centroid, joints)
-        if position is None:
-            self.missing_pose = True
-            return math.nan
-        start = self._starts.setdefault(name, position)
-        return length(map(sub, position, start))
 
     def _located(
         self,
-        centroid: tuple[float, float],
+        centroids: Iterable[tuple[float, float]],
         joints: Floats | None,
-    ) -> Vector | None:
-        """Where a point of the skin lies; None if an arm's angles are not known."""
-        point = self.layout.position(*centroid)
+    ) -> Sequence[Vector] | None:
+        """Where points of the skin lie; None if an arm's angles are not known."""
+        points = [self.layout.position(*centroid) for centroid in centroids]
         if self.chain is None:
-            return point
-        return None if joints is None else self.chain.point(joints, point)
+            return points
+        return None if joints is None else self.chain.points(joints, points)
 
     def position(self) -> Vector | None:
         """(x, y, z) where the region's centroid was last seen.
@@ -310,7 +302,8 @@ class Contact:
         """
         if self.region is None:
             return None
-        return self._located(self.region.centroid, self.joints)
+        places = self._located([self.region.centroid], self.joints)
+        return None if places is None else places[0]
 
     def series(self) -> FeatureSeries:
         """The measurements so far; later frames do not change them."""

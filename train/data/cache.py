@@ -86,8 +86,15 @@ def contacts_of(
     with suppress(*DAMAGED):
         return _read(path, layout)
     contacts = follow()
-    with suppress(InputError), write_whole(path, lasting=False) as file:
-        np.savez_compressed(file, **_arrays(contacts))  # type: ignore[arg-type]
+    with (
+        suppress(InputError),
+        write_whole(path, lasting=False) as file,
+        # The usual level of NumPy takes three times as long for 5 % less.
+        zipfile.ZipFile(file, "w", zipfile.ZIP_DEFLATED, compresslevel=1) as entry,
+    ):
+        for name, value in _arrays(contacts).items():
+            with entry.open(f"{name}.npy", "w") as member:
+                np.lib.format.write_array(member, value, allow_pickle=False)
     return contacts
 
 

@@ -22,7 +22,7 @@ from edge.errors import InputError
 from edge.features.kernels import KernelTable, kernel_channels
 from edge.features.names import Feature, feature, feature_types
 from edge.features.quantities import KERNELS
-from edge.features.vector import FEATURES, SAMPLES, WINDOW_S, feature_vector, widths
+from edge.features.vector import FEATURES, SAMPLES, WINDOW_S, feature_vectors, widths
 from edge.files import read_bytes
 from edge.record.labels import read_table
 from edge.record.npz import LARGEST_BYTES
@@ -176,7 +176,7 @@ class DataSet:
         names: Sequence[str] | None = None,
     ) -> Floats:
         """(n, features * samples) feature vectors (see
-        `edge.features.vector.feature_vector`).
+        `edge.features.vector.feature_vectors`).
 
         Args:
             window_s: seconds from onset.
@@ -184,33 +184,42 @@ class DataSet:
             names: some of the features measured; all where None.
         """
         names = self.names if names is None else tuple(names)
-        keys = {
-            name: (id(self.trials), window_s, samples, name, self.kernels.get(name))
-            for name in names
-        }
+        keys = self._keys(window_s, samples, names)
         tables = self.scratch.tables
         missing = [name for name in names if keys[name] not in tables]
         if missing:
+            table = self._measured((window_s,), samples, missing)[0]
             sizes = widths(missing, samples, self.layout, self.joints)
-            table = self.scratch.empty((len(self.trials), sum(sizes)))
-            for row, trial in zip(table, self.each(), strict=True):
-                row[:] = feature_vector(
-                    trial.series, window_s, samples, missing, self.kernels
-                )
             columns = np.split(table, np.cumsum(sizes)[:-1], axis=1)
             # The trials stay beside their facts, so that no others get their id.
             for name, of_name in zip(missing, columns, strict=True):
                 tables[keys[name]] = self.trials, of_name
         return np.concatenate([tables[keys[name]][1] for name in names], axis=1)
 
+    def _keys(
+        self, window_s: float, samples: int, names: Sequence[str]
+    ) -> dict[str, tuple[Any, ...]]:
+        """{feature: the key of its table}."""
+        return {
+            name: (id(self.trials), window_s, samples, name, self.kernels.get(name))
+            for name in names
+        }
+
+    def _measured(
+        self, windows_s: Sequence[float], samples: int, names: Sequence[str]
+    ) -> Floats:
+        """(windows, n, p) feature vectors, in a file."""
+        size = sum(widths(names, samples, self.layout, self.joints))
+        measured = self.scratch.empty((len(windows_s), len(self.trials), size))
+        for i, trial in enumerate(self.each()):
+            measured[:, i] = feature_vectors(
+                trial.series, windows_s, samples, names, self.kernels
+            )
+        return measured
+
     def at_points(self, points_s: Sequence[float], samples: int) -> Floats:
         """(points, n, p) feature vectors at several windows."""
-        shape = (len(points_s), len(self.trials), sum(self.widths(samples)))
-        X = self.scratch.empty(shape)
-        for of_point, seconds in zip(X, points_s, strict=True):
-            of_point[:] = self.features(seconds, samples)
-            self.scratch.release()
-        return X
+        return self._measured(points_s, samples, self.names)
 
     def vectors(self, window_s: float, samples: int, y: Labels) -> Vectors:
         """The feature vectors at a window, with the labels of some tasks."""

@@ -27,7 +27,7 @@ def kernel_table(touches: Sequence[Integers], biases: int, alike: bool) -> Kerne
 
     Args:
         touches: (channels, samples) of each touch, see
-            `edge.features.vector.kernel_channels`.
+            `edge.features.kernels.kernel_channels`.
         biases: how many there are.
         alike: the channels have one unit and share a shift.
     """

@@ -10,7 +10,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from edge.errors import InputError
-from edge.features.vector import feature_vector
+from edge.features.names import PAPER
+from edge.features.vector import feature_vector, feature_vectors
 from edge.touch.arm import Chain
 from edge.touch.contact import FeatureSeries
 from edge.touch.layout import SkinLayout
@@ -116,6 +117,29 @@ def test_motion_is_interpolated_over_frames_without_a_pose():
         assert vector[8:] == pytest.approx(sampled)
 
 
+@pytest.mark.parametrize("release_s", [0.05, 0.15, 60.0])
+def test_windows_measured_together_have_the_bits_of_each_alone(release_s):
+    """Also where the contact lifts off within one of them, is over in another and goes
+    on in a later one, and where the first frames lack the pose."""
+    t = np.arange(13) / 10.0
+    peak = [300, 310, 320, 0, 330, 340, 350, 360, 0, 0, 0, 0, 0]
+    area = [3 * (count > 0) for count in peak]
+    motion = np.where(t < 0.2, np.nan, np.sqrt(t))
+    felt = series(t, peak, area, motion)
+    felt = replace(felt, layout=replace(felt.layout, release_s=release_s))
+    names = [
+        *PAPER,
+        "log_max_force",
+        "relative_max_force_rate@7",
+        "max_force_deviation",
+    ]
+    names += ["contact_area_mean", "contact_motion_roughness"]
+    windows = [0.1, 0.25, 0.3, 0.7, 0.9, 1.2]
+    together = feature_vectors(felt, windows, 12, names)
+    alone = [feature_vector(felt, window_s, 12, names) for window_s in windows]
+    assert together.tobytes() == np.stack(alone).tobytes()
+
+
 def pressed_vector(layout, taxels, features, samples, window_s=1.0):
     """The features (features, samples) of frames of these taxels, uniform in a
     second."""
@@ -207,7 +231,8 @@ import edge
 from edge import demo
 from edge.features.names import feature, measures
 from edge.features.names import names as all_names
-from edge.features.vector import feature_vector
+from edge.features.names import PAPER
+from edge.features.vector import feature_vector, feature_vectors
 from edge.touch.track import (ContactTracker, first_contact)
 
 names = [n for n in all_names() if "kernels" not in n and "shear" not in n]
