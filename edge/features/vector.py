@@ -109,7 +109,7 @@ def feature_vector(
             empty, a feature does not exist or was not measured, or its table is
             missing.
     """
-    return feature_vectors(series, [window_s], samples, features, tables)[0]
+    return np.asarray(feature_vectors(series, [window_s], samples, features, tables)[0])
 
 
 def feature_vectors(

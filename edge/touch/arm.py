@@ -153,7 +153,7 @@ class Chain:
         motions = self._motions(angles)
         return [self._carried(motions, (*position, 1.0)) for position in positions]
 
-    def _motions(self, angles: Sequence[Any]) -> list[tuple[Any, Any]]:
+    def _motions(self, angles: Iterable[Any]) -> list[tuple[Any, Any]]:
         """Of each moving joint the sine and 1 - the cosine of its angle, or its travel
         twice; angles are numbers or arrays."""
         motions = []

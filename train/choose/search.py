@@ -215,7 +215,7 @@ class Decomposition:
             spectrum = self._spectrum
             classes = spectrum.classes(self._labels[task])
             self._along[task, shrinkages] = [
-                (spectrum.scores @ along, self._new_scores @ along)
+                (spectrum.coordinates(along), self._new_scores @ along)
                 for along in spectrum.directions(classes, shrinkages)
             ]
         return self._along[task, shrinkages]

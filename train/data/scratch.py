@@ -73,7 +73,7 @@ class Scratch:
             self.release()
         room_left = self._chunks[-1][self._used : self._used + size]
         self._used += -(-size // ALIGNED) * ALIGNED
-        values: NDArray[Any] = np.asarray(room_left).view(dtype)
+        values: NDArray[Any] = room_left.view(dtype)
         return values.reshape(shape)
 
     def _chunk(self, size: int) -> NDArray[np.uint8]:
@@ -90,7 +90,8 @@ class Scratch:
                 if hasattr(os, "posix_fallocate"):  # Windows has none
                     os.posix_fallocate(file.fileno(), 0, size)
                 file.truncate(size)
-            return np.memmap(path, np.uint8, "r+", shape=(size,))
+            # Views of a `memmap` would take a kilobyte each.
+            return np.asarray(np.memmap(path, np.uint8, "r+", shape=(size,)))
         except OSError as error:
             raise InputError(
                 f"{tempfile.gettempdir()}: has no room for {size / 1e6:.0f} MB of "

@@ -2,7 +2,7 @@
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from itertools import compress
+from itertools import compress, pairwise
 from typing import Any, Self
 
 import numpy as np
@@ -49,6 +49,12 @@ def blocks(rows: NDArray[Any], others: int) -> list[NDArray[Any]]:
     return np.array_split(rows, 1 + len(rows) * others // BLOCK)
 
 
+def column_parts(X: Floats) -> list[slice]:
+    """The columns of X (n, p) in parts, whose matrices take little memory."""
+    edges = np.linspace(0, X.shape[1], 2 + X.size // BLOCK).astype(int)
+    return [slice(*ends) for ends in pairwise(edges.tolist())]
+
+
 @dataclass(frozen=True)
 class Vectors:
     """Feature vectors of n trials, and what they are.
@@ -86,11 +92,16 @@ class Vectors:
     def of(self, names: Collection[str]) -> Self:
         """The same trials with the features with these names; all if empty."""
         is_named = [not names or name in names for name in self.features]
-        if all(is_named):  # a copy would leave the file that it may be in
+        if all(is_named):
             return self
+        columns = self.columns_of(names)
+        X = self.X[..., columns[0] : columns[-1] + 1]
+        # A copy would leave the file that the vectors may be in.
+        if X.shape[-1] > len(columns):
+            X = np.ascontiguousarray(self.X[..., columns])
         return replace(
             self,
-            X=np.ascontiguousarray(self.X[..., self.columns_of(names)]),
+            X=X,
             features=tuple(compress(self.features, is_named)),
             widths=tuple(compress(self.columns, is_named)),
         )

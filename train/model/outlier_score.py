@@ -28,7 +28,7 @@ roots is rounded once by each operation, so that every engine gives the same bit
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import reduce
 from typing import NamedTuple
@@ -42,7 +42,7 @@ from scipy.spatial.distance import cdist
 from edge.arrays import Booleans, Floats, Integers
 from edge.features.names import feature
 from train.data.scratch import each_part, rows_of
-from train.data.vectors import MOST_ROWS, Strings, Vectors, blocks
+from train.data.vectors import MOST_ROWS, Strings, Vectors, blocks, column_parts
 from train.model.prototypes import clusters
 from train.threads import in_processes, single_thread
 
@@ -157,32 +157,39 @@ class OutlierSpace:
         """
         labels = labels[trials]
         scales = [_scale(x[trials], widths, least) for x in each_part(X)]
-
-        def steps() -> Iterator[Floats]:
-            # A decision point at a time, as all together take much memory.
-            for x, scale in zip(each_part(X), scales, strict=True):
-                yield _steps(x[trials], *scale)
-
         columns = X.shape[-1] - int(np.isinf(least).sum())
         # Half of the columns, so that something can lie outside the components.
         most = min(MOST_COMPONENTS, len(labels) // TRIALS_A_COMPONENT, columns // 2)
         is_wide = len(X) * len(labels) < X.shape[-1]
         # Of many trials, every second, third and so on tells the components.
-        some = (of_point[:: -(-len(labels) // MOST_ROWS)] for of_point in steps())
-        axes = (_axes_of_few if is_wide else _axes)(some, max(most, 1))
+        some = np.arange(X.shape[1])[trials][:: -(-len(labels) // MOST_ROWS)]
+        steps = (
+            _steps(x[some], *scale)
+            for x, scale in zip(each_part(X), scales, strict=True)
+        )
+        axes = (_axes_of_few if is_wide else _axes)(steps, max(most, 1))
         shift = _shift(axes, STORED_BITS)
         weights = np.rint(np.ldexp(axes, shift))
-        at_end = _steps(X[-1][trials], *scales[-1])
-        of_trials = _clusters(_product(at_end, weights, shift), labels)
+
+        def components(x: Floats, scale: Scale) -> Floats:
+            parts = blocks(x[trials], x.shape[1])
+            return np.concatenate(
+                [_product(_steps(part, *scale), weights, shift) for part in parts]
+            )
+
+        of_trials = _clusters(components(X[-1], scales[-1]), labels)
         points = tuple(
-            _point(*scale, _product(of_point, weights, shift), labels, of_trials)
-            for scale, of_point in zip(scales, steps(), strict=True)
+            _point(*scale, components(x, scale), labels, of_trials)
+            for x, scale in zip(each_part(X), scales, strict=True)
         )
         return cls(weights, shift, points)
 
     def scores(self, X: Floats) -> Scores:
         """The scores of vectors (decision points, m, p)."""
-        pairs = map(self._scores, self.points, X)
+        pairs = []
+        for point, x in zip(self.points, X, strict=True):
+            parts = [self._scores(point, part) for part in blocks(x, x.shape[1])]
+            pairs.append([np.concatenate(of) for of in zip(*parts, strict=True)])
         return Scores(*map(np.stack, zip(*pairs, strict=True)))
 
     def _scores(self, point: OutlierPoint, x: Floats) -> tuple[Floats, Floats]:
@@ -231,13 +238,15 @@ def least_deviations(vectors: Vectors, drawn: bool) -> Floats:
     return least
 
 
-def _scale(
-    x: Floats, widths: Sequence[int], least: Floats | float
-) -> tuple[Floats, Floats]:
+Scale = tuple[Floats, Floats]
+"""Mean (p,) and steps a unit (p,) of columns."""
+
+
+def _scale(x: Floats, widths: Sequence[int], least: Floats | float) -> Scale:
     """Mean (p,) of each column of x (n, p), and its steps a unit (p,): 0 of those that
     do not count."""
     mean = _in_float32(x.mean(axis=0))
-    deviation = x.std(axis=0)
+    deviation = np.concatenate([x[:, part].std(axis=0) for part in column_parts(x)])
     columns = np.array(widths, dtype=np.int64)
     starts = np.cumsum(columns) - columns
     squares = np.add.reduceat(deviation**2, starts) / columns

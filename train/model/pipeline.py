@@ -202,7 +202,11 @@ class FittedSpace:
 
     def project(self, X: Floats) -> Floats:
         """Coordinates (n, c) of vectors (n, p)."""
-        return self.projection.transform(X[:, self.columns])
+        parts = [
+            self.projection.transform(part[:, self.columns])
+            for part in blocks(X, X.shape[1])
+        ]
+        return np.concatenate(parts)
 
 
 @dataclass(frozen=True, eq=False)
@@ -413,7 +417,8 @@ def _fit_space(choices: Choices, vectors: Vectors) -> dict[str, FittedTask]:
         choice.shrinkage,
         vectors.columns,
     )
-    X = vectors.X[members]
+    # A copy of all trials would take as much memory as they do.
+    X = vectors.X if len(members) == vectors.trials else vectors.X[members]
     projection.fit(X, np.column_stack(targets))
     columns = np.arange(X.shape[1])
     projected = projection.transform(X)

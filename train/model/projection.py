@@ -18,7 +18,8 @@ from numpy.typing import NDArray
 from edge.arrays import Booleans, Floats, Integers
 from edge.errors import InputError
 from edge.features.vector import FEATURES
-from train.model.scaling import centred_and_scaled, column_means
+from train.data.vectors import blocks
+from train.model.scaling import centred_and_scaled, column_means, largest_of
 
 FEATURE_BITS = 22
 """Bits of the largest scaled difference from the mean in training."""
@@ -55,8 +56,7 @@ def _centred(X: Floats) -> tuple[Floats, Floats, Booleans]:
     mean = column_means(X)
     centred = X - mean
     # In a constant column only the rounding of its mean is left.
-    largest = np.abs(X).max(axis=0)
-    still = np.abs(centred).max(axis=0) <= 4 * np.finfo(float).eps * largest
+    still = largest_of(centred) <= 4 * np.finfo(float).eps * largest_of(X)
     # The mean of a large offset is rounded, which would leave a constant in every row.
     centred -= centred.mean(axis=0)
     centred[:, still] = 0.0
@@ -124,7 +124,6 @@ class Spectrum:
     Attributes:
         values: (r,) eigenvalues above their own rounding, the largest first.
         rows: (n, p) centred.
-        scores: (n, r) coordinates of the rows along the eigenvectors.
     """
 
     def __init__(self, X: Floats) -> None:
@@ -137,8 +136,20 @@ class Spectrum:
         keep = values > max(n, p) * np.finfo(float).eps * values[-1]
         self.values = np.ascontiguousarray(values[keep][::-1])
         self._vectors = np.ascontiguousarray(vectors[:, keep][:, ::-1])
-        roots = np.sqrt(self.values)
-        self.scores = self._vectors * roots if self._dual else self.rows @ self._vectors
+
+    def coordinates(self, directions: Floats) -> Floats:
+        """(..., n, c) coordinates of the rows along directions (..., r, c) among the
+        eigenvectors."""
+        if not self._dual:
+            return np.asarray(self.rows @ (self._vectors @ directions))
+        return np.asarray((self._vectors * np.sqrt(self.values)) @ directions)
+
+    def _sums(self, members: Floats) -> Floats:
+        """(r, c) sums of the rows' coordinates along the eigenvectors, with the weights
+        of members (n, c)."""
+        if not self._dual:
+            return np.asarray(self._vectors.T @ (self.rows.T @ members))
+        return np.asarray((self._vectors * np.sqrt(self.values)).T @ members)
 
     def _lift(self, directions: Floats) -> Floats:
         """Directions (r, c) among the eigenvectors as weights of the columns (p, c)."""
@@ -206,12 +217,12 @@ class Spectrum:
             labels = np.unique(labels, return_inverse=True)[1]
         members = (labels[:, None] == np.arange(len(sizes))).astype(np.float64)
         # The indicators of the members need no centring, as the rows are centred.
-        means = self.scores.T @ (members / np.sqrt(sizes))
+        means = self._sums(members / np.sqrt(sizes))
         return Classes(labels, sizes, members, means)
 
     def directions(self, classes: Classes, shrinkages: Sequence[float]) -> list[Floats]:
         """[shrinkage] (r, c) the `discriminants` in the eigenvectors' basis, to be
-        multiplied by `scores`."""
+        given to `coordinates`."""
         if not min(shrinkages) > 0.0:
             raise InputError(
                 f"the shrinkage of lda must be above 0, not {min(shrinkages):g}"
@@ -228,7 +239,7 @@ class Spectrum:
         for count, group in groupby(range(len(root)), separate.sum(axis=1).__getitem__):
             places = list(group)
             along = root[places, :, None] * left[places, :, :count]
-            z = self.scores @ along
+            z = self.coordinates(along)
             means = classes.members.T @ z / classes.sizes[:, None]
             within = z - means[:, classes.labels]
             spread = ridge[places] * (along**2).sum(axis=1)
@@ -302,7 +313,7 @@ class Grid:
             projected: (n, c) their coordinates; None for principal components, along
                 which rows are at most as long as d, whatever the number of components.
         """
-        largest = float(np.abs(d).max(initial=0.0))
+        largest = float(largest_of(d).max(initial=0.0))
         bits = coordinate_bits(components)
         rows = d if projected is None else projected
         longest = float(np.sqrt((rows**2).sum(axis=1)).max(initial=0.0))
@@ -413,5 +424,9 @@ class Projection:
 
     def transform(self, X: Floats) -> Floats:
         """Coordinates (n, c), multiples of `grid_.unit`, of vectors (n, p)."""
-        d = (np.asarray(X, dtype=np.float64) - self.mean_) * self.gain_
-        return self.grid_.project(d, self.weights_)
+        X = np.asarray(X, dtype=np.float64)
+        parts = [
+            self.grid_.project((part - self.mean_) * self.gain_, self.weights_)
+            for part in blocks(X, X.shape[1])
+        ]
+        return np.concatenate(parts)

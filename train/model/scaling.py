@@ -1,6 +1,6 @@
 """Scaling of feature vectors: a gain for each feature type."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -9,7 +9,7 @@ from edge.arrays import Booleans, Floats, Integers
 from edge.errors import InputError
 from edge.features.names import feature
 from edge.features.vector import FEATURES
-from train.data.vectors import widths_of
+from train.data.vectors import column_parts, widths_of
 
 OF_PAPER = ("none", "I", "II", "III", "IV", "V")
 """No scaling, and Methods I to V of the paper's Eqs. 1 to 5."""
@@ -42,15 +42,22 @@ def finite(X: Floats) -> Floats:
     return X
 
 
+def largest_of(X: Floats) -> Floats:
+    """(p,) the largest magnitude of each column of X (n, p)."""
+    highest = X.max(axis=0, initial=0.0)
+    return np.asarray(np.maximum(highest, -X.min(axis=0, initial=0.0)))
+
+
 def column_means(X: Floats) -> Floats:
     """(p,) mean of each column of X (n, p), also where its sum would overflow.
 
     A power of two brings each column's largest entry near 1. It rounds nothing, and
     entries whose sums are finite do without.
     """
-    if np.abs(X).max(initial=0.0) < SUMMABLE:
+    sizes = largest_of(X)
+    if sizes.max(initial=0.0) < SUMMABLE:
         return np.asarray(X.mean(axis=0))
-    powers = np.frexp(np.abs(X).max(axis=0, initial=0.0))[1]
+    powers = np.frexp(sizes)[1]
     return np.asarray(np.ldexp(np.ldexp(X, -powers).mean(axis=0), powers))
 
 
@@ -90,14 +97,13 @@ def scale_of(
     if method in ("none", "III"):
         return gain
     starts = np.cumsum(sizes) - sizes
-    magnitudes = np.maximum.reduceat(np.abs(X).max(axis=0, initial=0.0), starts)
+    magnitudes = np.maximum.reduceat(largest_of(X), starts)
     largest, powers = np.frexp(magnitudes)
     if method in ("I", "II"):
         return _inverse(largest, powers)
     if method in ("IV", BY_COLUMN):
         wide = np.array([feature(name).quantity.wide for name in features])
-        small = np.ldexp(X, -np.repeat(powers, sizes))
-        deviations = _deviations(small, sizes, wide)
+        deviations = _deviations(X, -np.repeat(powers, sizes), sizes, wide)
         # A spread below the rounding of its own mean is no spread.
         deviations[deviations <= 8 * np.finfo(float).eps * largest] = 0.0
         return _inverse(deviations, powers)
@@ -117,19 +123,32 @@ def _inverse(scale: Floats, powers: NDArray[np.int32]) -> Floats:
 
 def _deviations(
     X: Floats,
+    powers: NDArray[np.int32],
     sizes: Integers,
     wide: Booleans,
 ) -> Floats:
-    """(features,) standard deviation of each feature type over all of its columns.
+    """(features,) standard deviation of each feature type over all of its columns, which
+    are multiplied by 2^powers (p,).
 
     Each cell or joint has a level of its own, which says nothing about a trial: a wide
     feature deviates from each column's mean.
     """
     starts = np.cumsum(sizes) - sizes
-    means = X.mean(axis=0)
+    parts = column_parts(X)
+
+    def small() -> Iterator[Floats]:
+        for part in parts:
+            yield np.ldexp(X[:, part], powers[part])
+
+    means = np.concatenate([columns.mean(axis=0) for columns in small()])
     of_type = np.add.reduceat(means, starts) / sizes
     levels = np.where(np.repeat(wide, sizes), means, np.repeat(of_type, sizes))
-    squares = ((X - levels) ** 2).mean(axis=0)
+    squares = np.concatenate(
+        [
+            ((columns - levels[part]) ** 2).mean(axis=0)
+            for columns, part in zip(small(), parts, strict=True)
+        ]
+    )
     return np.asarray(np.sqrt(np.add.reduceat(squares, starts) / sizes))
 
 
@@ -154,12 +173,14 @@ def centred_and_scaled(
         mean = column_means(X)
         gains = scale_of(X, method, features, widths)
         gain = np.repeat(gains, widths_of(X.shape[1], features, widths))
-        d = (X - mean) * gain
+        d = X - mean
         if method == BY_COLUMN:
-            blend = (1.0 - SHARE_OF_TYPE) * d.var(axis=0) + SHARE_OF_TYPE
-            gain /= np.sqrt(blend)
-            d = (X - mean) * gain
-    largest = float(np.abs(d).max(initial=0.0))
+            variances = np.concatenate(
+                [(d[:, part] * gain[part]).var(axis=0) for part in column_parts(d)]
+            )
+            gain /= np.sqrt((1.0 - SHARE_OF_TYPE) * variances + SHARE_OF_TYPE)
+        d *= gain
+    largest = float(largest_of(d).max(initial=0.0))
     if not (largest == 0.0 or SMALLEST_SCALE <= largest <= LARGEST_SCALE):
         raise InputError(
             f"the features spread over {largest:g} once scaled; distances need "
