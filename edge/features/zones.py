@@ -17,7 +17,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from edge.arrays import Array, Booleans, Floats, Integers
+from edge.arrays import Array, Floats, Integers
 from edge.touch.contact import FeatureSeries
 from edge.touch.grid import best_cut
 from edge.touch.layout import SkinLayout
@@ -27,6 +27,8 @@ ZONES = ("contact", "skin", "left", "right")
 ZONE_WIDTH = 8
 """Whole numbers of a zone, in this order: largest count, taxels, sum of counts, and the
 sums of counts times row, column, row squared, row times column, column squared."""
+PRODUCTS = [0, 3, 1, 6, 4, 2]
+"""Of a matrix (3, 3) of products of powers of row and column, those of a zone."""
 SHEAR_WIDTH = 2
 """Whole numbers of a zone's shear: the sums of both components. They stand behind the
 zone's other numbers."""
@@ -43,11 +45,14 @@ class Zones:
     def __init__(self, layout: SkinLayout, names: Sequence[str], shear: bool) -> None:
         self.names = names
         self.width = ZONE_WIDTH + SHEAR_WIDTH * shear
-        self._wraps = layout.wraps
         half = layout.cols // 2
-        self._halves = {"left": slice(0, half), "right": slice(half, layout.cols)}
         rows = np.arange(layout.rows)
         cols = np.arange(layout.cols)
+        columns_of = {"left": cols < half, "right": cols >= half}
+        everywhere = cols >= 0
+        self._columns = np.stack([columns_of.get(name, everywhere) for name in names])
+        """(zones, cols) whether a zone has a column."""
+        self._closed = [layout.wraps and name not in columns_of for name in names]
         self._rows = np.stack([rows**0, rows, rows**2])
         # Columns as counted from each cut of the circle, and their squares.
         turned = np.where(cols < cols[:, None], cols + layout.cols, cols)
@@ -68,28 +73,25 @@ class Zones:
         """
         if contact is None:
             return [0] * (self.width * len(self.names))
-        row: list[int] = []
-        # The skin and its halves have the same counts.
-        touched: dict[bool, tuple[Array, Array]] = {}
-        for zone in self.names:
-            half = self._halves.get(zone, slice(None))
-            in_contact = zone == "contact"
-            mask = contact.mask if in_contact else active.mask
-            if in_contact not in touched:
-                of_mask = active.counts * mask
-                # Of each column: counts, times row, times row squared.
-                touched[in_contact] = of_mask, self._rows @ of_mask
-            counts, lines = (values[:, half] for values in touched[in_contact])
-            closed = self._wraps and zone not in self._halves
-            cut = best_cut(lines[0].tolist()) if closed else 0
-            (force, cols, cols_cols), (rows, rows_cols, _), (rows_rows, *_) = (
-                lines @ self._cols[cut, half]
-            ).tolist()
-            row += int(counts.max(initial=0)), int(np.count_nonzero(counts))
-            row += force, rows, cols, rows_rows, rows_cols, cols_cols
-            if self.width > ZONE_WIDTH:
-                assert shear is not None
-                row += _shear_sums(shear[:, half], mask[:, half])
+        masks = active.mask & self._columns[:, None]
+        if self.names[0] == "contact":
+            masks[0] = contact.mask
+        counts = active.counts * masks
+        # Of each column: counts, times row, times row squared.
+        lines = self._rows @ counts
+        pairs = zip(self._closed, lines[:, 0].tolist(), strict=True)
+        cuts = [best_cut(weights) if closed else 0 for closed, weights in pairs]
+        products = (lines @ self._cols[cuts]).reshape(-1, 9)
+        sums = [
+            counts.max(axis=(1, 2), initial=0)[:, None],
+            np.count_nonzero(counts, axis=(1, 2))[:, None],
+            products[:, PRODUCTS],
+        ]
+        if self.width > ZONE_WIDTH:
+            assert shear is not None
+            touched = shear * masks[..., None]
+            sums.append(touched.sum(axis=(1, 2), dtype=np.int64))
+        row: list[int] = np.concatenate(sums, axis=1).ravel().tolist()
         return row
 
     def split(self, rows: Integers) -> dict[str, Integers]:
@@ -97,13 +99,6 @@ class Zones:
         return dict(
             zip(self.names, np.split(rows, len(self.names), axis=1), strict=True)
         )
-
-
-def _shear_sums(shear: NDArray[np.int16], mask: Booleans) -> list[int]:
-    """The `SHEAR_WIDTH` whole numbers of a zone, from its shear and its active
-    taxels."""
-    touched = shear * mask[..., None]
-    return list(map(int, touched.sum(axis=(0, 1), dtype=np.int64)))
 
 
 @dataclass(frozen=True)

@@ -187,7 +187,7 @@ class Chain:
                 x = x + (f * ax + g * (ky * az - kz * ay))
                 y = y + (f * ay + g * (kz * ax - kx * az))
                 z = z + (f * az + g * (kx * ay - ky * ax))
-            x, y, z = (a * x + b * y + c * z + d * w for a, b, c, d in step)
+            x, y, z = [a * x + b * y + c * z + d * w for a, b, c, d in step]
         return x, y, z
 
     def to_dict(self) -> dict[str, Any]:

@@ -82,12 +82,11 @@ class Curve:
         share = evidence.mean(evidence.honest) * (1.0 - WITHHELD * (1.0 - known))
         target = min(max(share, half_an_answer), known - half_an_answer)
 
-        def surplus(shift: float) -> float:
-            shifted = replace(self, intercept=self.intercept + shift)
-            probabilities = shifted.probabilities(margins, excess)
-            return evidence.mean(probabilities * evidence.known) - target
-
         logits = self.slope * margins + self.intercept - self.doubt * excess
+
+        def surplus(shift: float) -> float:
+            return evidence.mean(expit(logits + shift) * evidence.known) - target
+
         reach = 50.0 + float(np.abs(logits).max(initial=0.0))
         shift = float(brentq(surplus, -reach, reach))
         return replace(self, intercept=self.intercept + shift)

@@ -247,7 +247,14 @@ class FittedTask:
 
     def nearest(self, squares: Floats) -> Integers:
         """(n, k) places of the smallest squares (n, m); of equal ones the first."""
-        return np.argsort(squares, axis=1, kind="stable")[:, : self.k]
+        last = np.partition(squares, self.k - 1, axis=1)[:, self.k - 1, None]
+        near = squares <= last
+        if near.sum() > len(squares) * self.k:  # several are as far as the last one
+            return np.argsort(squares, axis=1, kind="stable")[:, : self.k]
+        places = np.nonzero(near)[1].reshape(-1, self.k)
+        smallest = np.take_along_axis(squares, places, axis=1)
+        order = np.argsort(smallest, axis=1, kind="stable")
+        return np.take_along_axis(places, order, axis=1)
 
     def neighbours(self, X: Floats) -> tuple[Floats, Integers]:
         """Distances and rows of the model (n, k) for vectors (n, p), nearest first."""
