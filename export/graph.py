@@ -105,7 +105,9 @@ def _squares_of_task(
     for r, c in zip(rows, components, strict=True):
         squares = (r[:, :c] ** 2).sum(axis=1)
         lengths.append(np.where(absent, np.inf, squares))
-    return _squares(build, f"lengths of {task}", z, z, columns, lengths)
+    number = build.numbered(lengths)
+    build.constant(number, f"lengths of {task}")
+    return _squares(build, f"lengths of rows {number}", z, z, columns, lengths)
 
 
 def _vote(

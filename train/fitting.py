@@ -231,8 +231,11 @@ def calibrate(
     options: FitOptions,
 ) -> SequentialClassifier:
     """A classifier for all decision points, with its stopping rules."""
-    names = settings.features(folds=True)
-    dataset = measured.of(sorted(names))
+    dataset = measured.of(sorted(settings.features(folds=True)))
+    # Those of the model come first, so that they are no copy: see `Vectors.of`.
+    exported = settings.features()
+    names = sorted(dataset.names, key=lambda name: name not in exported)
+    dataset = replace(dataset, names=tuple(names))
     at_points = dataset.at_points(points, options.samples)
     LOG.debug("calibrating by vectors (points, trials, columns) %s", at_points.shape)
     classifier = SequentialClassifier(

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from edge.touch.contact import FeatureSeries
 
 METADATA_KEY = "edge-classify"
-FORMAT = 11
+FORMAT = 12
 NOT_NEGATIVE = {"low": 0.0}
 RISK = {"low": 0.0, "high": 1.0, "open_low": True}
 SLOPE = {"low": 1e-12, "high": 1e12}

@@ -119,7 +119,8 @@ def answer(at: Constants, task: str, z: Floats, off: Floats) -> dict[str, Array]
     if f"mask of {task}" in at:
         z = z * at.numbers(f"mask of {task}", 1)
     rows = at.coordinates(task)
-    lengths = at.numbers(f"lengths of {task}", 1)
+    number = int(at.numbers(f"lengths of {task}"))
+    lengths = at.numbers(f"lengths of rows {number}", 1)
     squares = squared_distances(z, z, rows, lengths)
     labels = at.numbers(f"labels of {task}", 1)
     classes = int(labels.max()) + 1
