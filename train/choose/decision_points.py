@@ -1,5 +1,7 @@
 """The usual decision points of a model: as many as calibration and its size allow."""
 
+from collections.abc import Mapping
+
 import numpy as np
 
 from edge.features.vector import WINDOW_S
@@ -7,7 +9,7 @@ from train.choose.options import FitOptions
 from train.choose.settings import Settings
 from train.data.dataset import DataSet
 from train.data.vectors import MOST_ROWS
-from train.model.outlier_score import MOST_COMPONENTS
+from train.model.outlier_score import MOST_CENTRES, MOST_COMPONENTS
 from train.model.pipeline import Choices
 from train.model.stopping import FEWEST
 
@@ -16,8 +18,8 @@ STEPS_S = (0.1, 0.2, 0.3, 0.4, 0.6)
 `LARGEST_BYTES` is taken."""
 FIRST_S = 0.2
 """The first decision point."""
-LARGEST_BYTES = 1_600_000
-"""Bytes of weights with which a model stays below 1.9 MB."""
+LARGEST_BYTES = 1_850_000
+"""Bytes of constants with which a model stays below 2 MB."""
 
 
 def decision_points(
@@ -65,7 +67,7 @@ def usual_points(
         if size <= LARGEST_BYTES:
             fewer = (
                 f"{len(points)} decision points, one every {step_s:g} s, so that the "
-                "model stays below 1.9 MB; --decision-points asks for more"
+                "model stays below 2 MB; --decision-points asks for more"
             )
             return tuple(points), [fewer] * (every_s > STEPS_S[0])
     return (settings.window_s,), [
@@ -77,23 +79,32 @@ def usual_points(
 def _size(points: int, dataset: DataSet, settings: Settings, samples: int) -> int:
     """Bytes of the constants of a model with so many decision points."""
     columns = sum(dataset.widths(samples))
-    trials = min(len(dataset.trials), MOST_ROWS)
+    trials = len(dataset.trials)
+    compared = trials if trials <= MOST_ROWS else MOST_CENTRES
     shared = 2 * MOST_COMPONENTS * columns
-    outlier_score = MOST_COMPONENTS * (2 * trials + 4 * MOST_COMPONENTS)
-    outlier_score += 8 * columns + 24 * trials
-    early = settings.choices
-    if settings.early is not None:
-        early = {**early, **settings.early.choices}
+    outlier_score = MOST_COMPONENTS * (2 * compared + 4 * MOST_COMPONENTS)
+    outlier_score += 8 * columns + 24 * compared
+    full = settings.choices
+    early = full if settings.early is None else {**full, **settings.early.choices}
+    # Tasks share what is the same at all decision points.
+    spaces = {task: (early[task].space(task), full[task].space(task)) for task in full}
     rows = settings.rows(dataset)
-    full = _bytes_of(settings.choices, dataset, samples, rows)
-    before = (points - 1) * (outlier_score + _bytes_of(early, dataset, samples, rows))
-    return shared + before + outlier_score + full
+    at_end, before = (
+        _bytes_of(choices, spaces, dataset, samples, rows) for choices in (full, early)
+    )
+    return shared + points * outlier_score + (points - 1) * before + at_end
 
 
-def _bytes_of(choices: Choices, dataset: DataSet, samples: int, rows: int) -> int:
+def _bytes_of(
+    choices: Choices,
+    spaces: Mapping[str, object],
+    dataset: DataSet,
+    samples: int,
+    rows: int,
+) -> int:
     """Bytes of the constants that project and compare at a decision point.
 
-    A column has a mean, a gain, and a weight for each coordinate; a row its
+    A column has a number, a mean, a gain, and a weight for each coordinate; a row its
     coordinates and their length. Tasks that share a space share these.
     """
     widths = dict(zip(dataset.names, dataset.widths(samples), strict=True))
@@ -105,8 +116,8 @@ def _bytes_of(choices: Choices, dataset: DataSet, samples: int, rows: int) -> in
             targets = choice.targets or (task,)
             components = sum(len(set(dataset.labels(t).tolist())) - 1 for t in targets)
         components = min(components, len(dataset.trials))
-        size = columns * (16 + 4 * components) + rows * (8 + 4 * components)
-        space = choice.space(task)
+        size = columns * (24 + 4 * components) + rows * (8 + 4 * components)
+        space = spaces[task]
         sizes[space] = max(sizes.get(space, 0), size)
     return sum(sizes.values())
 

@@ -109,7 +109,7 @@ class FitOptions:
         "seconds from onset at which decisions before the full window are calibrated "
         "(edge-classify run --error), as a range or a list a,b,c, or `none` (default: "
         f"{DECISION_POINTS} from {FEWEST} trials on, and fewer points if the model would "
-        "exceed 1.9 MB)",
+        "exceed 2 MB)",
         "--decision-points",
         metavar="A:B:STEP",
     )

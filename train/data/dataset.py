@@ -176,7 +176,7 @@ class DataSet:
         names: Sequence[str] | None = None,
     ) -> Floats:
         """(n, features * samples) feature vectors (see
-        `edge.features.vector.feature_vectors`).
+        `edge.features.vector.feature_vectors`), which may be in a file.
 
         Args:
             window_s: seconds from onset.
@@ -188,12 +188,14 @@ class DataSet:
         tables = self.scratch.tables
         missing = [name for name in names if keys[name] not in tables]
         if missing:
-            table = self._measured((window_s,), samples, missing)[0]
+            table: Floats = self._measured((window_s,), samples, missing)[0]
             sizes = widths(missing, samples, self.layout, self.joints)
             columns = np.split(table, np.cumsum(sizes)[:-1], axis=1)
             # The trials stay beside their facts, so that no others get their id.
             for name, of_name in zip(missing, columns, strict=True):
                 tables[keys[name]] = self.trials, of_name
+            if missing == [*names]:
+                return table
         return np.concatenate([tables[keys[name]][1] for name in names], axis=1)
 
     def _keys(

@@ -132,6 +132,7 @@ def answers_without(
                     )
                 )
             shared[point].clear()
+        del outside, training
         tested = rows_of(vectors.X, left_out)
         return [answers(of_run, tested) for of_run in models]
 

@@ -51,12 +51,14 @@ NO_DISTANCE = 1e-6
 rounding."""
 
 
-def _centred(X: Floats) -> tuple[Floats, Floats, Booleans]:
-    """Mean (p,), X minus the mean, and whether each column has no variance (p,)."""
+def _centred(X: Floats, out: Floats | None = None) -> tuple[Floats, Floats, Booleans]:
+    """Mean (p,), X minus the mean, and whether each column has no variance (p,); the
+    second may take the place of X."""
     mean = column_means(X)
-    centred = X - mean
+    largest = largest_of(X)
+    centred = np.subtract(X, mean, out=out)
     # In a constant column only the rounding of its mean is left.
-    still = largest_of(centred) <= 4 * np.finfo(float).eps * largest_of(X)
+    still = largest_of(centred) <= 4 * np.finfo(float).eps * largest
     # The mean of a large offset is rounded, which would leave a constant in every row.
     centred -= centred.mean(axis=0)
     centred[:, still] = 0.0
@@ -120,15 +122,17 @@ class Spectrum:
 
     Args:
         X: (n, p) rows.
+        in_place: the centred rows take the place of X, as many copies would take much
+            memory; there are no principal axes then.
 
     Attributes:
         values: (r,) eigenvalues above their own rounding, the largest first.
         rows: (n, p) centred.
     """
 
-    def __init__(self, X: Floats) -> None:
+    def __init__(self, X: Floats, in_place: bool = False) -> None:
         self._given = X
-        _, self.rows, _ = _centred(X)
+        _, self.rows, _ = _centred(X, X if in_place else None)
         n, p = self.rows.shape
         self._dual = n < p
         scatter = self.rows @ self.rows.T if self._dual else self.rows.T @ self.rows
@@ -414,7 +418,7 @@ class Projection:
             )
         if y is None:
             raise InputError("the projection lda needs labels; use pca without them")
-        spectrum = Spectrum(d)
+        spectrum = Spectrum(d, in_place=True)
         targets = np.asarray(y).reshape(len(d), -1).T
         labels = [np.unique(target, return_inverse=True)[1] for target in targets]
         weights = [

@@ -15,6 +15,7 @@ from threadpoolctl import threadpool_limits
 
 from edge.arrays import Booleans, Floats, Integers
 from train.data.folds import SEED, finest, label_sets
+from train.data.scratch import let_go
 from train.data.vectors import MOST_ROWS, Labels, Strings, Vectors
 from train.model.pipeline import Choices, Fits, fit_together
 
@@ -56,6 +57,7 @@ def divided(
         if not fitted:
             fitted |= fit_together(choice, at_point)
         spaces.append(fitted[task].space.project(at_point.X))
+        let_go(vectors.X[point])
     coordinates = np.hstack(spaces)
     return clusters(coordinates, label_sets(at_point.y), count)
 

@@ -34,12 +34,20 @@ def finite(X: Floats) -> Floats:
     Raises:
         InputError: a feature is not finite.
     """
-    X = np.ascontiguousarray(X, dtype=np.float64)
+    X = in_rows(X)
     if not np.isfinite(X).all():
         raise InputError(
             f"the features of trial {np.argwhere(~np.isfinite(X))[0][0]} are not finite"
         )
     return X
+
+
+def in_rows(X: Floats) -> Floats:
+    """X (n, p), each row in a row of memory: the order there decides the order of sums,
+    and so which of equal axes is taken. Part of a larger array is no copy."""
+    X = np.asarray(X, dtype=np.float64)
+    is_in_rows = X.strides[0] >= X.shape[1] * X.strides[1] == X.shape[1] * X.itemsize
+    return X if is_in_rows else np.ascontiguousarray(X)
 
 
 def largest_of(X: Floats) -> Floats:
@@ -166,9 +174,7 @@ def centred_and_scaled(
     Raises:
         InputError: the scale is beyond what distances hold.
     """
-    # The order in memory decides the order of sums, and so which of equal axes is
-    # taken.
-    X = np.ascontiguousarray(X, dtype=np.float64)
+    X = in_rows(X)
     with np.errstate(over="ignore", invalid="ignore"):
         mean = column_means(X)
         gains = scale_of(X, method, features, widths)

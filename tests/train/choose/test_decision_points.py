@@ -14,10 +14,10 @@ from train.model.pipeline import Choice
     ("trials", "objects", "components", "points"),
     [
         (140, 18, 99, (0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0, 1.1, 1.2)),
-        (1300, 18, 17, (0.2, 0.4, 0.6, 0.8, 1.0, 1.2)),
+        (2000, 18, 17, (0.2, 0.4, 0.6, 0.8, 1.0, 1.2)),
         # no more coordinates than discriminants
         (160, 120, 999, (0.2, 0.4, 0.6, 0.8, 1.0, 1.2)),
-        (2000, 90, 89, (1.2,)),
+        (4000, 90, 89, (1.2,)),
     ],
 )
 def test_a_model_has_the_decision_points_that_keep_it_small(
