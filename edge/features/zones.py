@@ -12,7 +12,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cache, cached_property, partial
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,8 +28,6 @@ ZONES = ("contact", "skin", "left", "right")
 ZONE_WIDTH = 8
 """Whole numbers of a zone, in this order: largest count, taxels, sum of counts, and the
 sums of counts times row, column, row squared, row times column, column squared."""
-PRODUCTS = [0, 3, 1, 6, 4, 2]
-"""Of a matrix (3, 3) of products of powers of row and column, those of a zone."""
 SHEAR_WIDTH = 2
 """Whole numbers of a zone's shear: the sums of both components. They stand behind the
 zone's other numbers."""
@@ -46,17 +45,18 @@ class Zones:
         self.names = names
         self.width = ZONE_WIDTH + SHEAR_WIDTH * shear
         half = layout.cols // 2
-        rows = np.arange(layout.rows)
         cols = np.arange(layout.cols)
         columns_of = {"left": cols < half, "right": cols >= half}
         everywhere = cols >= 0
         self._columns = np.stack([columns_of.get(name, everywhere) for name in names])
         """(zones, cols) whether a zone has a column."""
         self._closed = [layout.wraps and name not in columns_of for name in names]
-        self._rows = np.stack([rows**0, rows, rows**2])
-        # Columns as counted from each cut of the circle, and their squares.
-        turned = np.where(cols < cols[:, None], cols + layout.cols, cols)
-        self._cols = np.stack([turned**0, turned, turned**2], axis=2)
+        # Of a small skin, floats hold every sum exactly.
+        largest = (
+            2**16 * layout.rows * layout.cols * max(layout.rows, 2 * layout.cols) ** 2
+        )
+        self._kind = np.float64 if largest < 2**53 else np.int64
+        self._weights = cache(partial(_weights, layout.shape, self._kind))
 
     def measure(
         self,
@@ -77,21 +77,25 @@ class Zones:
         if self.names[0] == "contact":
             masks[0] = contact.mask
         counts = active.counts * masks
-        # Of each column: counts, times row, times row squared.
-        lines = self._rows @ counts
-        pairs = zip(self._closed, lines[:, 0].tolist(), strict=True)
-        cuts = [best_cut(weights) if closed else 0 for closed, weights in pairs]
-        products = (lines @ self._cols[cuts]).reshape(-1, 9)
-        sums = [
-            counts.max(axis=(1, 2), initial=0)[:, None],
-            np.count_nonzero(counts, axis=(1, 2))[:, None],
-            products[:, PRODUCTS],
+        pairs = zip(self._closed, counts.sum(axis=1).tolist(), strict=True)
+        cuts = [best_cut(of_cols) if closed else 0 for closed, of_cols in pairs]
+        flat = counts.reshape(len(cuts), -1)
+        values = flat.astype(self._kind)
+        if any(cuts):
+            lines = zip(values, map(self._weights, cuts), strict=True)
+            sums = np.stack([line @ weights for line, weights in lines])
+        else:
+            sums = values @ self._weights(0)
+        parts = [
+            flat.max(axis=1)[:, None],
+            masks.reshape(flat.shape).sum(axis=1)[:, None],
+            sums.astype(np.int64),
         ]
         if self.width > ZONE_WIDTH:
             assert shear is not None
             touched = shear * masks[..., None]
-            sums.append(touched.sum(axis=(1, 2), dtype=np.int64))
-        row: list[int] = np.concatenate(sums, axis=1).ravel().tolist()
+            parts.append(touched.sum(axis=(1, 2), dtype=np.int64))
+        row: list[int] = np.concatenate(parts, axis=1).ravel().tolist()
         return row
 
     def split(self, rows: Integers) -> dict[str, Integers]:
@@ -99,6 +103,17 @@ class Zones:
         return dict(
             zip(self.names, np.split(rows, len(self.names), axis=1), strict=True)
         )
+
+
+def _weights(
+    shape: tuple[int, int], kind: type[np.number[Any]], cut: int
+) -> NDArray[Any]:
+    """(taxels, 6) of each taxel 1, row, column, row squared, row times column, column
+    squared; columns below the cut count as one turn higher."""
+    rows, cols = np.indices(shape).reshape(2, -1)
+    cols = np.where(cols < cut, cols + shape[1], cols)
+    powers = [rows**0, rows, cols, rows * rows, rows * cols, cols * cols]
+    return np.stack(powers, axis=1).astype(kind)
 
 
 @dataclass(frozen=True)
