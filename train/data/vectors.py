@@ -16,8 +16,8 @@ Strings = NDArray[np.str_]
 
 MOST_ROWS = 500
 """Trials that are the rows of a model themselves; of more, few rows stand for all."""
-BLOCK = 1 << 22
-"""Entries of a matrix that is made at once."""
+BLOCK = 1 << 19
+"""Entries of a matrix that is made at once, few enough for a processor's cache."""
 Labels = Mapping[str, Strings]
 """{task: (n,) labels}; empty where a trial has none, which then does not count."""
 

@@ -42,7 +42,7 @@ from scipy.spatial.distance import cdist
 from edge.arrays import Booleans, Floats, Integers
 from edge.features.names import feature
 from train.data.scratch import each_part, rows_of
-from train.data.vectors import MOST_ROWS, Strings, Vectors, blocks, column_parts
+from train.data.vectors import MOST_ROWS, Strings, Vectors, blocks
 from train.model.prototypes import clusters
 from train.threads import in_processes, single_thread
 
@@ -155,14 +155,16 @@ class OutlierSpace:
             least: (p,) of `least_deviations`.
             trials: (n,) mask of those that it is the space of.
         """
-        labels = labels[trials]
-        scales = [_scale(x[trials], widths, least) for x in each_part(X)]
+        counts = np.zeros(len(labels), dtype=np.bool_)
+        counts[trials] = True
+        labels = labels[counts]
+        scales = [_scale(x, counts, widths, least) for x in each_part(X)]
         columns = X.shape[-1] - int(np.isinf(least).sum())
         # Half of the columns, so that something can lie outside the components.
         most = min(MOST_COMPONENTS, len(labels) // TRIALS_A_COMPONENT, columns // 2)
         is_wide = len(X) * len(labels) < X.shape[-1]
         # Of many trials, every second, third and so on tells the components.
-        some = np.arange(X.shape[1])[trials][:: -(-len(labels) // MOST_ROWS)]
+        some = np.flatnonzero(counts)[:: -(-len(labels) // MOST_ROWS)]
         steps = (
             _steps(x[some], *scale)
             for x, scale in zip(each_part(X), scales, strict=True)
@@ -172,10 +174,11 @@ class OutlierSpace:
         weights = np.rint(np.ldexp(axes, shift))
 
         def components(x: Floats, scale: Scale) -> Floats:
-            parts = blocks(x[trials], x.shape[1])
+            # Those of all are less work than a copy of some.
+            parts = blocks(x, x.shape[1])
             return np.concatenate(
                 [_product(_steps(part, *scale), weights, shift) for part in parts]
-            )
+            )[counts]
 
         of_trials = _clusters(components(X[-1], scales[-1]), labels)
         points = tuple(
@@ -242,11 +245,18 @@ Scale = tuple[Floats, Floats]
 """Mean (p,) and steps a unit (p,) of columns."""
 
 
-def _scale(x: Floats, widths: Sequence[int], least: Floats | float) -> Scale:
-    """Mean (p,) of each column of x (n, p), and its steps a unit (p,): 0 of those that
-    do not count."""
-    mean = _in_float32(x.mean(axis=0))
-    deviation = np.concatenate([x[:, part].std(axis=0) for part in column_parts(x)])
+def _scale(
+    x: Floats, counts: Booleans, widths: Sequence[int], least: Floats | float
+) -> Scale:
+    """Mean (p,) of each column of x (n, p) over the rows that count (n,), and its steps
+    a unit (p,): 0 of those that do not."""
+    weights = counts / np.count_nonzero(counts)
+    mean = weights @ x
+    parts = blocks(x, x.shape[1])
+    of_parts = np.split(weights, np.cumsum(list(map(len, parts)))[:-1])
+    pairs = zip(of_parts, parts, strict=True)
+    deviation = np.sqrt(sum(weight @ (part - mean) ** 2 for weight, part in pairs))
+    mean = _in_float32(mean)
     columns = np.array(widths, dtype=np.int64)
     starts = np.cumsum(columns) - columns
     squares = np.add.reduceat(deviation**2, starts) / columns
