@@ -7,6 +7,8 @@ import numpy as np
 from edge.arrays import Integers
 from edge.features.kernels import (
     BITS,
+    CONVOLUTIONS,
+    SAMPLES,
     KernelTable,
     convolution_of_bias,
     convolved,
@@ -38,7 +40,10 @@ def kernel_table(touches: Sequence[Integers], biases: int, alike: bool) -> Kerne
     shifts = tuple(
         BITS - 1 - int(value).bit_length() if value else 0 for value in largest
     )
-    results = np.concatenate([convolved(shifted(t, shifts)) for t in touches], axis=1)
+    by_touch = np.empty((CONVOLUTIONS, len(touches), SAMPLES), dtype=np.int32)
+    for i, touch in enumerate(touches):
+        by_touch[:, i] = convolved(shifted(touch, shifts))
+    results = by_touch.reshape(CONVOLUTIONS, -1)
     results.sort(axis=1)
     shares = np.arange(1, biases + 1) * GOLDEN % 1.0
     places = (shares * results.shape[1]).astype(np.int64)
