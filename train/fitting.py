@@ -87,9 +87,9 @@ def _seconds(data: DataSet | str | Path | Sequence[str | Path]) -> dict[str, flo
     else:
         count = len(listed(map(str, [data] if isinstance(data, str | Path) else data)))
     return {
-        "following": 2.0 + 0.05 * count,
+        "following": 2.0 + 0.03 * count,
         "choosing": 20.0 + 0.06 * min(count, MOST_CHOSEN),
-        "calibrating": 10.0 + 0.05 * count,
+        "calibrating": 15.0 + 0.02 * count,
     }
 
 
