@@ -133,8 +133,8 @@ class Chain:
         transform[..., :3, :] = np.stack(self._carried(motions, np.eye(4)), axis=-2)
         return transform
 
-    def points(self, q: ArrayLike, positions: Iterable[Vector]) -> list[Vector]:
-        """Points of the tip in the base's frame, as plain floats: `pose(q)` times each.
+    def point(self, q: ArrayLike, position: Vector) -> Vector:
+        """A point of the tip in the base's frame, as plain floats: `pose(q)` times it.
 
         It is much faster than computing the pose. Rotations follow Rodrigues' formula,
         R = I + sin(q) K + (1 - cos(q)) K^2. It is computed with 1 - cos(q) = 2
@@ -142,16 +142,29 @@ class Chain:
 
         Args:
             q: (dof,) as for `pose`.
-            positions: in the tip's frame, metres.
+            position: (3,) in the tip's frame, metres.
 
         Raises:
             InputError: as `pose`.
         """
+        self.check(q)
+        motions = self._motions(np.asarray(q).tolist())
+        x, y, z = self._carried(motions, (*position, 1.0))
+        return x, y, z
+
+    def points(
+        self, q: Floats, positions: Sequence[Floats]
+    ) -> tuple[Floats, Floats, Floats]:
+        """x, y and z (m,) of `point` for angles (m, dof) that `check` takes, and
+        positions x, y and z (m,): the same bits."""
+        x, y, z = self._carried(self._motions(q.T), (*positions, 1.0))
+        return x, y, z
+
+    def check(self, q: ArrayLike) -> None:
+        """Refuse what `pose` refuses, much faster."""
         angles = np.asarray(q).tolist()
         if len(angles) != self.dof or not sum(map(abs, angles)) <= MOST_RAD:
             self.pose(q)  # raises
-        motions = self._motions(angles)
-        return [self._carried(motions, (*position, 1.0)) for position in positions]
 
     def _motions(self, angles: Iterable[Any]) -> list[tuple[Any, Any]]:
         """Of each moving joint the sine and 1 - the cosine of its angle, or its travel

@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from operator import sub
 from typing import TYPE_CHECKING, Any, Protocol, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
 from edge.arrays import Booleans, Counts, Floats, Integers
-from edge.elementary import length
 from edge.errors import InputError
 from edge.touch.frame import Frame
 from edge.touch.layout import SkinLayout
@@ -191,7 +189,6 @@ class Contact:
         self._rows: list[dict[str, Any]] = []
         """One dict per frame, keyed like `FeatureSeries`; `counted` (m,) holds the whole
         numbers of region and zones."""
-        self._starts: dict[str, Vector] = {}
         self._before: Counts | None = None
         """The counts of the last frame."""
 
@@ -213,7 +210,7 @@ class Contact:
         measures = self._measures
         if self._rows and age_s <= self.age_s:
             age_s = self.age_s
-            self._forget_last()
+            self._rows.pop()  # of two readings of one instant the later one counts
         if frame.valid is not None:
             self.missing_taxels |= bool((self.layout.alive & ~frame.valid).any())
         counted = [0] * PLAIN
@@ -222,13 +219,17 @@ class Contact:
             self.joints = frame.joints
             sums = region.sums if measures.motion else (0, 0)
             counted = [region.peak, region.area, *sums]
+            if self.chain is not None and (measures.motion or measures.force_motion):
+                self.missing_pose |= frame.joints is None
+                if frame.joints is not None:
+                    self.chain.check(frame.joints)
         if measures.zones is not None:
             counted += measures.zones.measure(active, region, frame.shear)
         row: dict[str, Any] = {
             "t": age_s,
             "same": self._repeats(frame),
             "counted": np.array(counted, dtype=np.int64),
-            **self._motions(frame, region, counted),
+            "pose": frame.joints,
         }
         for name, cells in measures.cells.items():
             row[name] = cells.read(frame)
@@ -244,54 +245,31 @@ class Contact:
         self._before = frame.counts
         return before is not None and bool((frame.counts == before).all())
 
-    def _forget_last(self) -> None:
-        """Drop the last frame: of two readings of one instant the later one counts."""
-        self._rows.pop()
-        for name in tuple(self._starts):
-            if not any(math.isfinite(row[name]) for row in self._rows):
-                del self._starts[name]
-
-    def _motions(
-        self,
-        frame: Frame,
-        region: Region | None,
-        counted: list[int],
-    ) -> dict[str, float]:
-        """The distances that the centroids have travelled, without contact the last."""
-        measures = self._measures
-        motions = {"motion": 0.0}
-        if measures.force_motion:
-            motions["force_motion"] = 0.0
-        if region is None:
-            if self._rows:
-                return {name: self._rows[-1][name] for name in motions}
-            return motions
-        centroids = {}
-        if measures.motion:
-            centroids["motion"] = region.centroid
-        if measures.force_motion:
-            # The contact's zone comes first.
-            _, _, force, rows, cols, *_ = counted[PLAIN:]
-            centroids["force_motion"] = rows / force, cols / force % self.layout.cols
-        places = self._located(centroids.values(), frame.joints)
-        if places is None:
-            self.missing_pose |= bool(centroids)
-            return motions | dict.fromkeys(centroids, math.nan)
-        for name, place in zip(centroids, places, strict=True):
-            start = self._starts.setdefault(name, place)
-            motions[name] = length(map(sub, place, start))
-        return motions
-
-    def _located(
-        self,
-        centroids: Iterable[tuple[float, float]],
-        joints: Floats | None,
-    ) -> Sequence[Vector] | None:
-        """Where points of the skin lie; None if an arm's angles are not known."""
-        points = [self.layout.position(*centroid) for centroid in centroids]
-        if self.chain is None:
-            return points
-        return None if joints is None else self.chain.points(joints, points)
+    def _motion(self, name: str, counted: Integers) -> Floats:
+        """(n,) distances that a centroid has travelled, by the whole numbers (n, m) of
+        the frames: without contact the last, NaN without a pose."""
+        numbers = counted.T
+        rows, cols, total = numbers[2], numbers[3], numbers[1]
+        if name == "force_motion":  # the contact's zone comes first
+            total, rows, cols = numbers[PLAIN + 2 : PLAIN + 5]
+        touched = numbers[1] > 0
+        located = touched.copy()
+        if self.chain is not None:
+            located &= [row["pose"] is not None for row in self._rows]
+        places = np.flatnonzero(located)
+        motion = np.where(touched, np.nan, 0.0)
+        if places.size:
+            total = total[places]
+            along = rows[places] / total
+            around = cols[places] / total % self.layout.cols
+            points = self.layout.position(along, around)
+            if self.chain is not None:
+                poses = np.array([self._rows[i]["pose"] for i in places.tolist()])
+                points = self.chain.points(poses, points)
+            x, y, z = (axis - axis[0] for axis in points)
+            motion[places] = np.sqrt(x * x + y * y + z * z)
+        frames = np.where(touched, np.arange(len(motion)), 0)
+        return motion[np.maximum.accumulate(frames)]
 
     def position(self) -> Vector | None:
         """(x, y, z) where the region's centroid was last seen.
@@ -302,18 +280,30 @@ class Contact:
         """
         if self.region is None:
             return None
-        places = self._located([self.region.centroid], self.joints)
-        return None if places is None else places[0]
+        point = self.layout.position(*self.region.centroid)
+        if self.chain is not None:
+            return None if self.joints is None else self.chain.point(self.joints, point)
+        x, y, z = map(float, point)
+        return x, y, z
 
     def series(self) -> FeatureSeries:
         """The measurements so far; later frames do not change them."""
         columns: dict[str, Any] = {
-            name: np.array([row[name] for row in self._rows]) for name in self._rows[0]
+            name: np.array([row[name] for row in self._rows])
+            for name in self._rows[0]
+            if name != "pose"
         }
         counted = columns.pop("counted")
-        zones = self._measures.zones
+        measures = self._measures
+        zones = measures.zones
+        motion = np.zeros(len(counted))
+        if measures.motion:
+            motion = self._motion("motion", counted)
+        if measures.force_motion:
+            columns["force_motion"] = self._motion("force_motion", counted)
         return FeatureSeries(
             **columns,
+            motion=motion,
             peak=counted[:, 0],
             area=counted[:, 1],
             sums=counted[:, 2:PLAIN],

@@ -22,6 +22,7 @@ LONGEST_M = 1000.0
 """Greatest length of a skin: far beyond any, so that no product of two overflows."""
 MOST_LINES = 1024
 """Most rows, and most columns."""
+RADIANS = math.pi / 180.0
 LINES = {"allowed": range(1, MOST_LINES + 1)}
 
 
@@ -109,11 +110,11 @@ class SkinLayout:
             else (self.pitch_m or 1.0,) * 2
         )
 
-    def position(self, row: float, col: float) -> tuple[float, float, float]:
-        """(x, y, z) of a point of the surface in the link's frame.
+    def position(self, row: Any, col: Any) -> tuple[Any, Any, Any]:
+        """(x, y, z) of a point of the surface in the link's frame, or of many.
 
         Args:
-            row: 0 to rows - 1, or between two rows.
+            row: 0 to rows - 1, or between two rows; a number or an array.
             col: 0 to cols, or between two columns; on a skin that wraps, cols is column
                 0 again.
 
@@ -122,7 +123,7 @@ class SkinLayout:
         """
         along, around = self.pitch
         if self.radius_m is None:
-            return col * around, row * along, 0.0
+            return col * around, row * along, 0.0 * row
         angle = self._angle(col)
         return (
             self.radius_m * cos(angle),
@@ -130,15 +131,16 @@ class SkinLayout:
             self.row0_z_m - row * along,
         )
 
-    def _angle(self, col: float) -> float:
+    def _angle(self, col: Any) -> Any:
         """Angle in radians of a place between columns, on the shorter arc."""
         if self.column_angles_deg is None:
             return 2.0 * math.pi * col / self.cols
-        column = math.floor(col)
-        a = self.column_angles_deg[column % self.cols]
-        b = self.column_angles_deg[(column + 1) % self.cols]
+        column = np.floor(col)
+        angles = np.array(self.column_angles_deg)
+        a = angles[np.int64(column) % self.cols]
+        b = angles[np.int64(column + 1) % self.cols]
         step = (b - a + 180.0) % 360.0 - 180.0
-        return math.radians(a + (col - column) * step)
+        return (a + (col - column) * step) * RADIANS
 
     def to_dict(self) -> dict[str, Any]:
         """The layout as the `skin` object of a recording's or a model's metadata."""

@@ -47,7 +47,7 @@ def test_missing_extra_and_non_finite_angles_are_named(q, word):
 @pytest.mark.parametrize("q", [[0, 0], [0, 0, math.nan, 0, 0]])
 def test_a_point_takes_no_others(q):
     with pytest.raises(InputError):
-        Chain.cody().points(q, [(0.0, 0.0, 0.0)])
+        Chain.cody().point(q, (0.0, 0.0, 0.0))
 
 
 @pytest.mark.parametrize(
@@ -107,8 +107,11 @@ def test_a_point_is_where_the_pose_takes_it(seed):
         poses = chain.pose(q)
         for i in np.ndindex(2, 3):
             expected = poses[i][:3, :3] @ at + poses[i][:3, 3]
-            (point,) = chain.points(q[i], [tuple(at)])
+            point = chain.point(q[i], tuple(at))
             assert point == pytest.approx(expected, abs=1e-14)
+            together = chain.points(q[0], [np.full(3, axis) for axis in at])
+            if i[0] == 0 and chain.dof:
+                assert tuple(axis[i[1]] for axis in together) == point
 
 
 @pytest.mark.parametrize(
