@@ -35,17 +35,20 @@ MOST_CHOSEN = 1000
 """Trials that settings are chosen by; the model has all. Accuracy on unseen objects does
 not grow with more of them."""
 
-PROGRAM_BYTES = 4e8
-TRIAL_BYTES = 24e3
-MATRICES = 6
-"""Memory of the program and of the facts of a trial, and how many matrices of the vectors
-of a decision point there are at once: measured with 140 to 10,000 trials."""
+PROGRAM_BYTES = 3.1e8
+CHOSEN_BYTES = 1.5e5
+TRIAL_BYTES = 15.5e3
+MATRICES = 2.4
+"""Memory of the program, of a trial that settings are chosen by, and of the facts of any
+trial, and how many matrices of the vectors of a decision point there are at once: measured
+with 140 to 100,000 trials."""
 
 
 def memory_bytes(trials: int, columns: int) -> float:
     """About how much memory the largest process of a fit takes at most, by the columns
     of a vector."""
-    return PROGRAM_BYTES + trials * (TRIAL_BYTES + MATRICES * 8 * columns)
+    chosen = CHOSEN_BYTES * min(trials, MOST_CHOSEN)
+    return PROGRAM_BYTES + chosen + trials * (TRIAL_BYTES + MATRICES * 8 * columns)
 
 
 def fit(data: DataSet | str | Path | Sequence[str | Path], **options: Any) -> Fitted:
