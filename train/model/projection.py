@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import groupby
 from typing import Any
 
@@ -146,14 +147,19 @@ class Spectrum:
         eigenvectors."""
         if not self._dual:
             return np.asarray(self.rows @ (self._vectors @ directions))
-        return np.asarray((self._vectors * np.sqrt(self.values)) @ directions)
+        return np.asarray(self._scores @ directions)
 
     def _sums(self, members: Floats) -> Floats:
         """(r, c) sums of the rows' coordinates along the eigenvectors, with the weights
         of members (n, c)."""
         if not self._dual:
             return np.asarray(self._vectors.T @ (self.rows.T @ members))
-        return np.asarray((self._vectors * np.sqrt(self.values)).T @ members)
+        return np.asarray(self._scores.T @ members)
+
+    @cached_property
+    def _scores(self) -> Floats:
+        """(n, r) coordinates of the rows along the eigenvectors of the dual."""
+        return self._vectors * np.sqrt(self.values)
 
     def _lift(self, directions: Floats) -> Floats:
         """Directions (r, c) among the eigenvectors as weights of the columns (p, c)."""
