@@ -159,7 +159,7 @@ class Spectrum:
     @cached_property
     def _scores(self) -> Floats:
         """(n, r) coordinates of the rows along the eigenvectors of the dual."""
-        return self._vectors * np.sqrt(self.values)
+        return np.asarray(self._vectors * np.sqrt(self.values))
 
     def _lift(self, directions: Floats) -> Floats:
         """Directions (r, c) among the eigenvectors as weights of the columns (p, c)."""
