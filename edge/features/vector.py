@@ -126,12 +126,12 @@ def feature_vectors(
     if samples < 2:
         raise InputError(f"a feature needs at least 2 samples, not {samples!r}")
     types = feature_types(features)
-    felt = [series.felt(window_s) for window_s in windows_s]
-    frames = np.array([contact.t.size for contact in felt])
+    parts = [series.felt(window_s) for window_s in windows_s]
+    frames = np.array([part.t.size for part in parts])
     if not frames.all():
         raise InputError("the contact has no frame")
-    longest = felt[int(frames.argmax())]
-    if not all((of.t == longest.t[: of.t.size]).all() for of in felt):
+    longest = parts[int(frames.argmax())]
+    if not all((part.t == longest.t[: part.t.size]).all() for part in parts):
         # A frame without contact counts in one window, and not in another.
         of_windows = [
             feature_vectors(series, [window_s], samples, features, tables)

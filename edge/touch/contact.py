@@ -229,7 +229,7 @@ class Contact:
             "t": age_s,
             "same": self._repeats(frame),
             "counted": np.array(counted, dtype=np.int64),
-            "pose": frame.joints,
+            "pose": None if frame.joints is None else frame.joints.copy(),
         }
         for name, cells in measures.cells.items():
             row[name] = cells.read(frame)
@@ -252,12 +252,12 @@ class Contact:
         rows, cols, total = numbers[2], numbers[3], numbers[1]
         if name == "force_motion":  # the contact's zone comes first
             total, rows, cols = numbers[PLAIN + 2 : PLAIN + 5]
-        touched = numbers[1] > 0
-        located = touched.copy()
+        has_contact = numbers[1] > 0
+        has_place = has_contact.copy()
         if self.chain is not None:
-            located &= [row["pose"] is not None for row in self._rows]
-        places = np.flatnonzero(located)
-        motion = np.where(touched, np.nan, 0.0)
+            has_place &= [row["pose"] is not None for row in self._rows]
+        places = np.flatnonzero(has_place)
+        motion = np.where(has_contact, np.nan, 0.0)
         if places.size:
             total = total[places]
             along = rows[places] / total
@@ -268,7 +268,7 @@ class Contact:
                 points = self.chain.points(poses, points)
             x, y, z = (axis - axis[0] for axis in points)
             motion[places] = np.sqrt(x * x + y * y + z * z)
-        frames = np.where(touched, np.arange(len(motion)), 0)
+        frames = np.where(has_contact, np.arange(len(motion)), 0)
         return motion[np.maximum.accumulate(frames)]
 
     def position(self) -> Vector | None:

@@ -192,7 +192,7 @@ class OutlierSpace:
         pairs = []
         for point, x in zip(self.points, X, strict=True):
             parts = [self._scores(point, part) for part in blocks(x, x.shape[1])]
-            pairs.append([np.concatenate(of) for of in zip(*parts, strict=True)])
+            pairs.append([np.concatenate(score) for score in zip(*parts, strict=True)])
         return Scores(*map(np.stack, zip(*pairs, strict=True)))
 
     def _scores(self, point: OutlierPoint, x: Floats) -> tuple[Floats, Floats]:
