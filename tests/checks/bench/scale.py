@@ -21,7 +21,8 @@ from tests.checks.bench.program import start
 
 TRIALS = 28
 """Recordings of a trial of each object in each condition."""
-DRAWN = 5, 80
+DRAWN = 5, 80, 357
+"""Such trials of the sizes that are drawn: 140, 2,240 and 9,996 recordings."""
 SCENE = tables.SCENES / "cody18.toml"
 POWERS = {"processor, s": 0.65, "memory, MB": 0.43}
 """Powers of the ratio of the trials that the ratios may reach."""
@@ -112,6 +113,10 @@ if __name__ == "__main__":
     start(
         measure,
         __doc__,
-        ("--repeats", [], "trials of each object and condition; 357 are 10,000"),
+        (
+            "--repeats",
+            [],
+            "trials of each object in each condition; 5, 80 and 357 where none are said",
+        ),
         ("--synthetic", [], "numbers of synthetic trials"),
     )
