@@ -184,11 +184,14 @@ class DataSet:
             names: some of the features measured; all where None.
         """
         names = self.names if names is None else tuple(names)
-        keys = self._keys(window_s, samples, names)
+        keys = {
+            name: (id(self.trials), window_s, samples, name, self.kernels.get(name))
+            for name in names
+        }
         tables = self.scratch.tables
         missing = [name for name in names if keys[name] not in tables]
         if missing:
-            table: Floats = self._measured((window_s,), samples, missing)[0]
+            table: Floats = self.at_points((window_s,), samples, missing)[0]
             sizes = widths(missing, samples, self.layout, self.joints)
             columns = np.split(table, np.cumsum(sizes)[:-1], axis=1)
             # The trials stay beside their facts, so that no others get their id.
@@ -198,30 +201,21 @@ class DataSet:
                 return table
         return np.concatenate([tables[keys[name]][1] for name in names], axis=1)
 
-    def _keys(
-        self, window_s: float, samples: int, names: Sequence[str]
-    ) -> dict[str, tuple[Any, ...]]:
-        """{feature: the key of its table}."""
-        return {
-            name: (id(self.trials), window_s, samples, name, self.kernels.get(name))
-            for name in names
-        }
-
-    def _measured(
-        self, windows_s: Sequence[float], samples: int, names: Sequence[str]
+    def at_points(
+        self,
+        points_s: Sequence[float],
+        samples: int,
+        names: Sequence[str] | None = None,
     ) -> Floats:
-        """(windows, n, p) feature vectors, in a file."""
+        """(points, n, p) feature vectors at several windows, in a file."""
+        names = self.names if names is None else names
         size = sum(widths(names, samples, self.layout, self.joints))
-        measured = self.scratch.empty((len(windows_s), len(self.trials), size))
+        X = self.scratch.empty((len(points_s), len(self.trials), size))
         for i, trial in enumerate(self.each()):
-            measured[:, i] = feature_vectors(
-                trial.series, windows_s, samples, names, self.kernels
+            X[:, i] = feature_vectors(
+                trial.series, points_s, samples, names, self.kernels
             )
-        return measured
-
-    def at_points(self, points_s: Sequence[float], samples: int) -> Floats:
-        """(points, n, p) feature vectors at several windows."""
-        return self._measured(points_s, samples, self.names)
+        return X
 
     def vectors(self, window_s: float, samples: int, y: Labels) -> Vectors:
         """The feature vectors at a window, with the labels of some tasks."""

@@ -29,14 +29,14 @@ class SyntheticSet(DataSet):
 
     recorded: int = 0
 
-    def _measured(self, windows_s, samples, names):
+    def at_points(self, points_s, samples, names=None):
         numbers = np.array([int(trial.path.stem) for trial in self.trials])
         _, first, places = np.unique(
             numbers % self.recorded, return_index=True, return_inverse=True
         )
         trials = tuple(self.trials[i] for i in first)
         of_recordings = replace(self, trials=trials)
-        centres = DataSet._measured(of_recordings, windows_s, samples, names)
+        centres = DataSet.at_points(of_recordings, points_s, samples, names)
         objects = of_recordings.labels("object")
         spread = np.sqrt(
             np.mean(
@@ -44,7 +44,7 @@ class SyntheticSet(DataSet):
                 axis=0,
             )
         )
-        measured = self.scratch.empty((len(windows_s), len(numbers), centres.shape[2]))
+        measured = self.scratch.empty((len(points_s), len(numbers), centres.shape[2]))
         for i, (number, place) in enumerate(zip(numbers, places, strict=True)):
             noise = np.random.default_rng([SEED, number]).normal(size=spread.shape[1])
             measured[:, i] = centres[:, place] + VARIES * noise * spread

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from scipy.linalg import eigh
 
+import train.data.vectors
 from train.data.folds import stratified_folds
 from train.data.vectors import Vectors
 from train.model import outlier_score
@@ -186,6 +187,16 @@ def test_a_new_score_of_any_small_set_lies_beyond_its_limit_as_often_as_asked():
 def test_where_all_trials_are_copies_anything_else_is_beyond_the_limit():
     typical, limits = limits_of(np.zeros((1, 40)), 0.02)
     assert typical == limits == (pytest.approx(LEAST),)
+
+
+def test_the_space_of_some_trials_is_as_if_there_were_no_others(monkeypatch):
+    X, labels = trials(120)
+    some = np.arange(120) % 5 != 1
+    alone = OutlierSpace.of(X[:, some], labels[some], WIDTHS).scores(X)
+    monkeypatch.setattr(train.data.vectors, "BLOCK", 200)
+    among_others = OutlierSpace.of(X, labels, WIDTHS, trials=some).scores(X)
+    for score, expected in zip(among_others, alone, strict=True):
+        assert score == pytest.approx(expected, rel=1e-9)
 
 
 def test_few_trials_have_few_components():

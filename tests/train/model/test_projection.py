@@ -4,6 +4,7 @@ import mpmath
 import numpy as np
 import pytest
 
+import train.data.vectors
 from edge.errors import InputError
 from tests.checks.hard_cases import exact
 from tests.checks.hard_cases.models import features
@@ -26,6 +27,25 @@ def test_components_match_long_double_and_have_a_fixed_sign():
     top = axes[np.arange(len(axes)), np.abs(axes).argmax(axis=1)]
     assert (top > 0).all()
     assert principal_axes(X[::-1])[1][:5] == pytest.approx(axes[:5], abs=1e-12)
+
+
+@pytest.mark.parametrize("scaling", ["IV", "columns"])
+@pytest.mark.parametrize("kind", ["pca", "lda"])
+@pytest.mark.parametrize("rows", [30, 300])
+def test_parts_of_many_vectors_give_the_same_bits(monkeypatch, scaling, kind, rows):
+    """Also those that are part of a larger array, as in a file."""
+    X = features(rows)
+    labels = np.arange(rows) % 3
+
+    def fitted(X):
+        projection = Projection(scaling, 4, kind=kind).fit(X, labels)
+        return projection.weights_.tobytes(), projection.transform(X).tobytes()
+
+    whole = fitted(X)
+    monkeypatch.setattr(train.data.vectors, "BLOCK", 50)
+    assert fitted(X) == whole
+    beside = np.hstack([X, X])
+    assert fitted(beside[:, : X.shape[1]]) == whole
 
 
 def test_the_sign_does_not_hang_on_rounding():
