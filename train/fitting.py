@@ -125,7 +125,8 @@ def _fitted(
     vectors = dataset.vectors(settings.window_s, fixed.samples, y)
     sequential = None
     if fixed.progress:
-        columns = sum(dataset.widths(fixed.samples))
+        of_folds = measured.of(sorted(settings.features(folds=True)))
+        columns = sum(of_folds.widths(fixed.samples))
         needed = memory_bytes(len(labels), columns)
         announce(f"calibrating: about {needed / 1e9:.2g} GB of memory")
     with stage("calibrating"):

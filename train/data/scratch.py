@@ -37,9 +37,10 @@ def each_part(values: NDArray[Any]) -> Iterator[NDArray[Any]]:
         let_go(part)
 
 
-def rows_of(values: NDArray[Any], rows: NDArray[Any]) -> NDArray[Any]:
-    """Some rows (parts, m, ...) of all parts of an array that a file may have."""
-    return np.stack([part[rows] for part in each_part(values)])
+def rows_of(values: NDArray[Any], rows: NDArray[Any]) -> Iterator[NDArray[Any]]:
+    """Some rows (m, ...) of each part of an array that a file may have."""
+    for part in each_part(values):
+        yield part[rows]
 
 
 class Scratch:

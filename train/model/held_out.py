@@ -1,6 +1,6 @@
 """Answers to trials by models that were fitted without them."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from statistics import fmean
 
@@ -29,7 +29,7 @@ Answers = dict[str, tuple[Strings, Floats]]
 """{task: labels and margins, (decision points, m) each}."""
 
 
-def answers(models: Sequence[ContactClassifier], X: Floats) -> Answers:
+def answers(models: Sequence[ContactClassifier], X: Iterable[Floats]) -> Answers:
     """The answers of models, one for each decision point, to vectors (points, m, p)."""
     by_task: dict[str, tuple[list[Strings], list[list[float]]]] = {}
     for model, x in zip(models, X, strict=True):
@@ -133,8 +133,7 @@ def answers_without(
                 )
             shared[point].clear()
         del outside, training
-        tested = rows_of(vectors.X, left_out)
-        return [answers(of_run, tested) for of_run in models]
+        return [answers(of_run, rows_of(vectors.X, left_out)) for of_run in models]
 
 
 def slopes_at_points(

@@ -187,7 +187,7 @@ class OutlierSpace:
         )
         return cls(weights, shift, points)
 
-    def scores(self, X: Floats) -> Scores:
+    def scores(self, X: Iterable[Floats]) -> Scores:
         """The scores of vectors (decision points, m, p)."""
         pairs = []
         for point, x in zip(self.points, X, strict=True):
