@@ -38,7 +38,7 @@ not grow with more of them."""
 PROGRAM_BYTES = 3.1e8
 CHOSEN_BYTES = 1.5e5
 TRIAL_BYTES = 15.5e3
-MATRICES = 2.4
+MATRICES = 2.8
 """Memory of the program, of a trial that settings are chosen by, and of the facts of any
 trial, and how many matrices of the vectors of a decision point there are at once: measured
 with 140 to 100,000 trials."""
