@@ -120,11 +120,7 @@ def feature_vectors(
     tables: Mapping[str, KernelTable] | None = None,
 ) -> Floats:
     """(windows, p) the `feature_vector` of each of several windows, in less time."""
-    for window_s in windows_s:
-        if not (math.isfinite(window_s) and window_s > 0.0):
-            raise InputError(f"the window must be above 0 seconds, not {window_s!r}")
-    if samples < 2:
-        raise InputError(f"a feature needs at least 2 samples, not {samples!r}")
+    _check(windows_s, samples)
     types = feature_types(features)
     parts = [series.felt(window_s) for window_s in windows_s]
     frames = np.array([part.t.size for part in parts])
@@ -145,6 +141,15 @@ def feature_vectors(
         groups = [tuple(group) for _, group in groupby(types, key=_kind)]
         blocks = [time_series.block(group, samples) for group in groups]
     return np.concatenate(blocks, axis=1)
+
+
+def _check(windows_s: Sequence[float], samples: int) -> None:
+    """Refuse windows and numbers of samples that make no sense."""
+    for window_s in windows_s:
+        if not (math.isfinite(window_s) and window_s > 0.0):
+            raise InputError(f"the window must be above 0 seconds, not {window_s!r}")
+    if samples < 2:
+        raise InputError(f"a feature needs at least 2 samples, not {samples!r}")
 
 
 def _kind(feature: Feature) -> tuple[str, int, tuple[str, ...], str]:
@@ -198,14 +203,14 @@ class _TimeSeries:
         valid = ~np.isnan(values)
         complete = valid.all(axis=1)
         sampled = np.zeros((len(values), *times.shape))
-        last = self.frames[:, None] - 1
-        sampled[complete] = _resample(times, t, values[complete], last)
+        ends = self.frames[:, None] - 1
+        sampled[complete] = _resample(times, t, values[complete], ends)
         for i in np.flatnonzero(~complete):
             for of_window, at, n in zip(sampled[i], times, self.frames, strict=True):
-                known = np.flatnonzero(valid[i, :n])
-                if known.size:
-                    ends = known.size - 1
-                    of_window[:] = _resample(at, t[known], values[i, known], ends)
+                places = np.flatnonzero(valid[i, :n])
+                if places.size:
+                    last = places.size - 1
+                    of_window[:] = _resample(at, t[places], values[i, places], last)
         if first.quantity.cells:
             return sampled / self.zones(first.zone).scale
         is_change = first.quantity.name == "joint_change"

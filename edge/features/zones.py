@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cache, cached_property, partial
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -56,7 +56,10 @@ class Zones:
             2**16 * layout.rows * layout.cols * max(layout.rows, 2 * layout.cols) ** 2
         )
         self._kind = np.float64 if largest < 2**53 else np.int64
-        self._weights = cache(partial(_weights, layout.shape, self._kind))
+        rows, cols = np.indices(layout.shape)
+        powers = [rows**0, rows, cols, rows * rows, rows * cols, cols * cols]
+        self._weights = np.stack(powers, axis=2).astype(self._kind)
+        """(rows, cols, 6) by which counts are multiplied for the sums of a zone."""
 
     def measure(
         self,
@@ -80,40 +83,36 @@ class Zones:
         pairs = zip(self._closed, counts.sum(axis=1).tolist(), strict=True)
         cuts = [best_cut(of_cols) if closed else 0 for closed, of_cols in pairs]
         flat = counts.reshape(len(cuts), -1)
-        values = flat.astype(self._kind)
-        if any(cuts):
-            lines = zip(values, map(self._weights, cuts), strict=True)
-            sums = np.stack([line @ weights for line, weights in lines])
-        else:
-            sums = values @ self._weights(0)
-        parts = [
+        sums = flat.astype(self._kind) @ self._weights.reshape(-1, 6)
+        for zone, cut in enumerate(cuts):
+            if cut:
+                sums[zone] += self._turned(counts[zone, :, :cut])
+        numbers = [
             flat.max(axis=1)[:, None],
             masks.reshape(flat.shape).sum(axis=1)[:, None],
             sums.astype(np.int64),
         ]
         if self.width > ZONE_WIDTH:
             assert shear is not None
-            touched = shear * masks[..., None]
-            parts.append(touched.sum(axis=(1, 2), dtype=np.int64))
-        row: list[int] = np.concatenate(parts, axis=1).ravel().tolist()
+            of_zones = shear * masks[..., None]
+            numbers.append(of_zones.sum(axis=(1, 2), dtype=np.int64))
+        row: list[int] = np.concatenate(numbers, axis=1).ravel().tolist()
         return row
+
+    def _turned(self, counts: Integers) -> NDArray[Any]:
+        """(6,) what a zone's sums gain where its first columns, of these counts (rows,
+        columns), count as one turn higher."""
+        weights = self._weights[:, : counts.shape[1], :3]
+        force, rows, cols = np.tensordot(counts.astype(self._kind), weights, 2)
+        turn = self._columns.shape[1]
+        squares = turn * (2 * cols + turn * force)
+        return np.stack([0, 0, turn * force, 0, turn * rows, squares])
 
     def split(self, rows: Integers) -> dict[str, Integers]:
         """{zone: (n, width)} of the numbers (n, zones * width) of frames."""
         return dict(
             zip(self.names, np.split(rows, len(self.names), axis=1), strict=True)
         )
-
-
-def _weights(
-    shape: tuple[int, int], kind: type[np.number[Any]], cut: int
-) -> NDArray[Any]:
-    """(taxels, 6) of each taxel 1, row, column, row squared, row times column, column
-    squared; columns below the cut count as one turn higher."""
-    rows, cols = np.indices(shape).reshape(2, -1)
-    cols = np.where(cols < cut, cols + shape[1], cols)
-    powers = [rows**0, rows, cols, rows * rows, rows * cols, cols * cols]
-    return np.stack(powers, axis=1).astype(kind)
 
 
 @dataclass(frozen=True)

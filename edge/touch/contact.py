@@ -188,7 +188,7 @@ class Contact:
         self._measures = measures
         self._rows: list[dict[str, Any]] = []
         """One dict per frame, keyed like `FeatureSeries`; `counted` (m,) holds the whole
-        numbers of region and zones."""
+        numbers of region and zones, and `pose` the joint angles that motion needs."""
         self._before: Counts | None = None
         """The counts of the last frame."""
 
@@ -213,23 +213,15 @@ class Contact:
             self._rows.pop()  # of two readings of one instant the later one counts
         if frame.valid is not None:
             self.missing_taxels |= bool((self.layout.alive & ~frame.valid).any())
-        counted = [0] * PLAIN
         if region is not None:
             self.region = region
             self.joints = frame.joints
-            sums = region.sums if measures.motion else (0, 0)
-            counted = [region.peak, region.area, *sums]
-            if self.chain is not None and (measures.motion or measures.force_motion):
-                self.missing_pose |= frame.joints is None
-                if frame.joints is not None:
-                    self.chain.check(frame.joints)
-        if measures.zones is not None:
-            counted += measures.zones.measure(active, region, frame.shear)
+        counted = self._counted(frame, active, region)
         row: dict[str, Any] = {
             "t": age_s,
             "same": self._repeats(frame),
             "counted": np.array(counted, dtype=np.int64),
-            "pose": None if frame.joints is None else frame.joints.copy(),
+            "pose": self._pose(frame, region),
         }
         for name, cells in measures.cells.items():
             row[name] = cells.read(frame)
@@ -238,6 +230,31 @@ class Contact:
             self.missing_pose |= frame.joints is None
         self._rows.append(row)
         self.age_s = age_s
+
+    def _counted(
+        self, frame: Frame, active: ActiveTaxels, region: Region | None
+    ) -> list[int]:
+        """The whole numbers of the region, and of the zones."""
+        measures = self._measures
+        counted = [0] * PLAIN
+        if region is not None:
+            sums = region.sums if measures.motion else (0, 0)
+            counted = [region.peak, region.area, *sums]
+        if measures.zones is not None:
+            counted += measures.zones.measure(active, region, frame.shear)
+        return counted
+
+    def _pose(self, frame: Frame, region: Region | None) -> Floats | None:
+        """The joint angles, where the region's motion is measured with the arm; None
+        where they are not known."""
+        moves = self._measures.motion or self._measures.force_motion
+        if self.chain is None or region is None or not moves:
+            return None
+        if frame.joints is None:
+            self.missing_pose = True
+            return None
+        self.chain.check(frame.joints)
+        return frame.joints.copy()
 
     def _repeats(self, frame: Frame) -> bool:
         """Whether a frame's counts are those of the last one."""
@@ -249,7 +266,7 @@ class Contact:
         """(n,) distances that a centroid has travelled, by the whole numbers (n, m) of
         the frames: without contact the last, NaN without a pose."""
         numbers = counted.T
-        rows, cols, total = numbers[2], numbers[3], numbers[1]
+        _, total, rows, cols = numbers[:PLAIN]
         if name == "force_motion":  # the contact's zone comes first
             total, rows, cols = numbers[PLAIN + 2 : PLAIN + 5]
         has_contact = numbers[1] > 0

@@ -253,8 +253,7 @@ def _scale(
     weights = counts / np.count_nonzero(counts)
     mean = weights @ x
     parts = blocks(x, x.shape[1])
-    of_parts = np.split(weights, np.cumsum(list(map(len, parts)))[:-1])
-    pairs = zip(of_parts, parts, strict=True)
+    pairs = zip(np.array_split(weights, len(parts)), parts, strict=True)
     deviation = np.sqrt(sum(weight @ (part - mean) ** 2 for weight, part in pairs))
     mean = _in_float32(mean)
     columns = np.array(widths, dtype=np.int64)

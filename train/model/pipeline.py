@@ -202,11 +202,7 @@ class FittedSpace:
 
     def project(self, X: Floats) -> Floats:
         """Coordinates (n, c) of vectors (n, p)."""
-        parts = [
-            self.projection.transform(part[:, self.columns])
-            for part in blocks(X, X.shape[1])
-        ]
-        return np.concatenate(parts)
+        return self.projection.transform(X, self.columns)
 
 
 @dataclass(frozen=True, eq=False)

@@ -432,11 +432,13 @@ class Projection:
         ]
         return np.hstack(weights), 1.0
 
-    def transform(self, X: Floats) -> Floats:
-        """Coordinates (n, c), multiples of `grid_.unit`, of vectors (n, p)."""
+    def transform(self, X: Floats, columns: Integers | slice = slice(None)) -> Floats:
+        """Coordinates (n, c), multiples of `grid_.unit`, of the columns of vectors that
+        it was fitted to."""
         X = np.asarray(X, dtype=np.float64)
-        parts = [
-            self.grid_.project((part - self.mean_) * self.gain_, self.weights_)
+        differences = (
+            (part[:, columns] - self.mean_) * self.gain_
             for part in blocks(X, X.shape[1])
-        ]
+        )
+        parts = [self.grid_.project(d, self.weights_) for d in differences]
         return np.concatenate(parts)
