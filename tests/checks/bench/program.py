@@ -16,6 +16,8 @@ def kind_of(default):
         return {"nargs": "+", "required": True}
     if default == []:
         return {"nargs": "*", "default": default}
+    if default == [int]:
+        return {"nargs": "*", "type": within(int, 1, 1e6), "default": []}
     if isinstance(default, type):
         return {"type": default, "required": True}
     if isinstance(default, bool):
@@ -34,7 +36,7 @@ def start(measure, description, *options):
         measure: a function of the options, by their names.
         description: of the program; the help shows its first paragraph.
         options: (name, default, help) of each. One that must be given has its type in
-            place of the default; a list takes several words.
+            place of the default; a list takes several words, or numbers if it is [int].
     """
     top = argparse.ArgumentParser(
         description=description.partition("\n\n")[0],

@@ -95,12 +95,12 @@ def rows_of(results):
 def measure(repeats, synthetic):
     """Fit each size, and write the table; 1 where a ratio is above its bound."""
     results = []
-    for number in sorted(map(int, repeats or DRAWN)):
+    for number in sorted(repeats or DRAWN):
         with tempfile.TemporaryDirectory() as folder:
             data = drawn(number, folder)
             words = ["export", "--data", data, "--out", folder]
             results.append(measured(number * TRIALS, folder, words))
-    for trials in sorted(map(int, synthetic)):
+    for trials in sorted(synthetic):
         with tempfile.TemporaryDirectory() as folder:
             words = [fleet.__name__, drawn(DRAWN[0], folder), f"{trials}", folder]
             results.append(measured(trials, folder, words))
@@ -115,8 +115,8 @@ if __name__ == "__main__":
         __doc__,
         (
             "--repeats",
-            [],
+            [int],
             "trials of each object in each condition; 5, 80 and 357 where none are said",
         ),
-        ("--synthetic", [], "numbers of synthetic trials"),
+        ("--synthetic", [int], "numbers of synthetic trials"),
     )
